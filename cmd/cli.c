@@ -199,7 +199,7 @@ void cli_finish(int status)
 static void library_gave_up(void)
 {
     output_discard();
-    cli_stop(VG_ENOMEM, "a library failed, most likely for lack of memory");
+    cli_stop(VG_ENOMEM, "a library failed, probably for lack of memory");
 }
 
 /* ---------------------------------------------------------------------------------------------- memory -- */
@@ -351,7 +351,7 @@ void cli_need_vertices(const vg_head *h, const char *subject)
     static const char *const advice[] = {
         [VG_VECTORS] = "pipe it through 'vg-solve' first",
         [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first",
-        [VG_TRANSFORMS] = "make vertices of them with 'vg-play MAP' first"};
+        [VG_TRANSFORMS] = "convert them to vertices with 'vg-play MAP' first"};
     if (h->kind == VG_VERTICES) return;
     bool known = h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS || h->kind == VG_TRANSFORMS;
     cli_stop(VG_EINPUT, "%s holds %s: %s", subject, vg_head_form(h),

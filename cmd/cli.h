@@ -38,7 +38,7 @@ typedef struct cli_moved {
 typedef struct cli_program {
     const char *name;     /* "vg-solve" */
     const char *synopsis; /* "[options] [FILE]": the text after the name */
-    const char *summary;  /* one line: what it does */
+    const char *summary;  /* one-line description */
     const cli_option *options; /* ends with a NULL name */
     const cli_moved *moved;    /* ends with a NULL name; NULL: none have moved */
     size_t most_operands;
@@ -148,7 +148,7 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
 
 /* cli_next: the next frame; false at the end. Damage ends the program. */
 bool cli_next(vg_source *s, vg_frame *f);
-/* cli_load: vg_load, which says what was left out of the mesh, and stops when it fails. */
+/* cli_load: vg_load; reports what was ignored in the mesh, and stops on failure. */
 void cli_load(vg_head *h, const char *operand, const char *what);
 /* cli_need_vertices: stop unless the frames are vertices, with a message that names the program to use first.
  * Messages call the sequence `subject` ("the input", "'a.vgs'"). */

@@ -1,5 +1,5 @@
-/* contents.c: vg-info: what reading all frames of a sequence tells: how many, their names, times and channels.
- * Leaves out what the head holds.
+/* contents.c: vg-info: what follows from reading all frames of a sequence: their number, names, times and channels.
+ * The head is reported in vg-info.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "contents.h"
 #include "cli.h"

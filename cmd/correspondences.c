@@ -62,7 +62,7 @@ void report_correspondence(report *r, const vg_head *h, double D)
     report_put(r, NULL, "target", report_text(line));
     report_put(r, "matched_faces", NULL, report_count(x.matched));
     report_put(r, "unmatched_faces", NULL, report_count(c->target_nf - x.matched));
-    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%), %" PRIu64 " ride with others", x.matched,
+    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%), %" PRIu64 " follow others", x.matched,
              c->target_nf, percent(x.matched, c->target_nf), (uint64_t)c->target_nf - x.matched);
     report_put(r, NULL, "matched", report_text(line));
     report_put(r, "source_faces_used", NULL, report_count(x.used));

@@ -75,7 +75,7 @@ static void note_aligned(const vg_driver *d, const vg_skeleton *s, const char *m
 static uint32_t take_joint(lines *l, const vg_skeleton *s, const char *whose)
 {
     size_t n = strcspn(l->now, " \t\r\n"), j = find_joint(s, l->now, n);
-    if (!n) lines_stop(l, "a line is a bone of the rig and a joint of the skeleton");
+    if (!n) lines_stop(l, "a bone of the rig and a joint of the skeleton expected");
     char advice[120];
     if (j == s->njoints)
         lines_stop(l, "%s has no joint '%.*s'%s", whose, (int)(n < 80 ? n : 80), l->now, advise(advice, s, l->now, n));
@@ -92,7 +92,7 @@ static uint32_t *read_pairs(const char *file, const vg_skeleton *of, const vg_sk
     lines l = lines_open(file);
     while (lines_next(&l)) {
         uint32_t bone = take_joint(&l, of, "the rig"), joint = take_joint(&l, by, "the skeleton");
-        if (*l.now) lines_stop(&l, "a line is a bone of the rig and a joint of the skeleton");
+        if (*l.now) lines_stop(&l, "a bone of the rig and a joint of the skeleton expected");
         if (partner[bone] != UINT32_MAX) lines_stop(&l, "bone '%.80s' is paired twice", of->joints[bone].name);
         partner[bone] = joint;
     }
@@ -112,7 +112,7 @@ vg_driver *driving_start(const driving_options *o, const vg_rig *rig, const char
     if (vg_driver_new(&d, rig, by, &how, &e) < 0) cli_die(&e);
     size_t missing = vg_driver_missing(d);
     if (missing)
-        cli_warn("%zu of %zu bones have no joint of the skeleton that belongs to them: they follow those above them",
+        cli_warn("%zu of %zu bones have no matching joint of the skeleton: they follow their parents",
                  missing, rig->nbones);
     note_aligned(d, &rig->skeleton, map);
     free(chosen);

@@ -1,5 +1,5 @@
-/* error_plot.c: the plot of vg-diff: errors over the frames, and the share of vertices that has each error, in D.
- * Leaves out how charts are drawn (lib/view/plot.c).
+/* error_plot.c: the plot of vg-diff: errors over the frames, and the distribution of vertices over errors, in D.
+ * Charts are drawn in lib/view/plot.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "error_plot.h"
 

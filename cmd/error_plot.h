@@ -17,7 +17,7 @@ void error_plot_check(const char *file, const char *report, const char *stream);
 /* error_curves_add: the errors of the next frame, in units of the mesh; those of a mesh without extent are left out. */
 void error_curves_add(error_curves *c, const double errors[ERROR_CURVES], double diagonal);
 void error_curves_clear(error_curves *c);
-/* error_plot_write: to the file, which becomes the output: nothing else is written behind it. */
+/* error_plot_write: write to the file, which becomes the output; nothing else may be written after it. */
 void error_plot_write(const error_curves *c, const vg_measure_stats *m, const char *truth, const char *result, const char *file);
 
 #endif

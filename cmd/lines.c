@@ -11,7 +11,7 @@ lines lines_open(const char *file)
 {
     size_t size;
     lines l = {.file = file, .text = cli_read_file(file, &size)};
-    if (memchr(l.text, 0, size)) cli_stop(VG_EINPUT, "'%s' is no text", file);
+    if (memchr(l.text, 0, size)) cli_stop(VG_EINPUT, "'%s' is not text", file);
     l.next = l.text;
     return l;
 }

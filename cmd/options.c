@@ -31,7 +31,7 @@ static const struct shared {
     {THREADS, {.name = "threads", .letter = 'j', .value = "N", .help = "use N threads (default: all processors)",
                .integer = &threads_asked, .least = 1, .most = MOST_THREADS}},
     {ALL, {.name = "quiet", .letter = 'q', .help = "no warnings and no progress", .flag = &cli.quiet}},
-    {ALL, {.name = "verbose", .letter = 'v', .help = "say more on standard error", .flag = &cli.verbose}},
+    {ALL, {.name = "verbose", .letter = 'v', .help = "report more on standard error", .flag = &cli.verbose}},
     {ALL, {.name = "help", .letter = 'h', .help = "print this help", .flag = &want_help}},
     {ALL, {.name = "version", .letter = 'V', .help = "print the version", .flag = &want_version}},
 };
@@ -154,7 +154,7 @@ static void list_words(const char *words, bool options, char *to, size_t size)
     }
 }
 
-static size_t choose(const cli_option *o, const char *value)
+static size_t take_choice(const cli_option *o, const char *value)
 {
     size_t number = 0, length = strlen(value);
     for (const char *p = o->value;; number++) {
@@ -172,7 +172,7 @@ static void take_option(size_t number, const char *value)
 {
     const cli_option *o = known.at[number];
     known.given[number] = true;
-    if (o->choice) *o->choice = choose(o, value);
+    if (o->choice) *o->choice = take_choice(o, value);
     if (o->flag) {
         *o->flag = true;
     } else if (o->text) {
@@ -289,7 +289,7 @@ static void take_second(const cli_option *o, int argc, char **argv)
 }
 
 /* Collect operands in order; options may stand between them; everything after "--" is an operand. */
-static size_t parse(int argc, char **argv, char **operands)
+static size_t collect_operands(int argc, char **argv, char **operands)
 {
     struct option longs[MOST_OPTIONS + 1] = {{0}};
     char letters[2 * MOST_OPTIONS + 4] = "-:";
@@ -362,7 +362,7 @@ size_t options_parse(int argc, char **argv, char **operands)
 {
     const cli_program *p = cli.program;
     gather_options(p);
-    size_t n = parse(argc, argv, operands);
+    size_t n = collect_operands(argc, argv, operands);
     if (want_help) print_help(p);
     if (want_version && !want_help) print_version(p->name);
     if (want_help || want_version) cli_finish(0);

@@ -251,6 +251,6 @@ void output_flush(void)
     snprintf(out.shown, sizeof out.shown, "standard output");
     errno = 0;
     if (fflush(stdout) || ferror(stdout)) die_writing(errno ? errno : EIO);
-    /* some file systems tell only here that the disk is full; a descriptor that was never open is no loss */
+    /* some file systems report a full disk only here; a descriptor that was never open is no error */
     if (close(STDOUT_FILENO) && errno != EBADF) die_writing(errno);
 }

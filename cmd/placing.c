@@ -1,6 +1,5 @@
-/* placing.c: --axes, --scale, --unit, --mirror and --origin of vg-encode: poses are turned, scaled, mirrored and moved, in
- * this order.
- * Leaves out what else is changed of a sequence (vg-encode.c).
+/* placing.c: --axes, --scale, --unit, --mirror and --origin of vg-encode: poses are rotated, scaled, mirrored and
+ * moved, in this order.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "placing.h"
 #include "units.h"
@@ -32,7 +31,7 @@ static const char *take_side(const char *p, double rows[9])
     return take_triple(p, rows);
 }
 
-static double determinant(const double m[9])
+static double axes_determinant(const double m[9])
 {
     return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
            m[2] * (m[3] * m[7] - m[4] * m[6]);
@@ -53,8 +52,8 @@ void placing_take_axes(const char *text, void *context)
     if (!end || *end)
         cli_usage("option '--axes' needs y-up, z-up or FROM:TO, each of them y-up, z-up or three axes (right, up, "
                   "towards the viewer) such as xz-y, not '%s'", text);
-    if (determinant(from) * determinant(to) < 0)
-        cli_usage("--axes %s would mirror the body: turn one of the axes round", text);
+    if (axes_determinant(from) * axes_determinant(to) < 0)
+        cli_usage("--axes %s would mirror the body: reverse one of the axes", text);
     for (size_t i = 0; i < 3; i++)
         for (size_t k = 0; k < 3; k++) {
             p->axes[3 * i + k] = 0;
@@ -97,7 +96,7 @@ static void turn_and_scale(const placing *p, double *x)
     }
 }
 
-static void move(const placing *p, double *x)
+static void place_point(const placing *p, double *x)
 {
     for (size_t i = 0; i < 3 * p->nv; i++) x[i] += p->shift[i % 3];
 }
@@ -113,7 +112,7 @@ void placing_frame(const placing *p, vg_frame *f)
 {
     turn_and_scale(p, f->values);
     mirror(p, f->values);
-    move(p, f->values);
+    place_point(p, f->values);
 }
 
 /* ---- the mirror ---- */
@@ -181,7 +180,7 @@ void placing_head(placing *p, vg_head *h)
     if (p->mirror) find_mirror(p, &h->body);
     mirror(p, h->body.reference);
     find_shift(p, h->body.reference);
-    move(p, h->body.reference);
+    place_point(p, h->body.reference);
     vg_rig_clear(&h->body.rig);
     vg_map_clear(&h->map);
 }

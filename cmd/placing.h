@@ -25,7 +25,7 @@ void placing_take_unit(const char *text, void *placing);
 void placing_take_mirror(const char *text, void *placing);
 /* placing_wanted: is there anything to do? */
 bool placing_wanted(const placing *p);
-/* placing_head: place the reference pose of h, whose frames are vertices, and drop what is not true of it any more. */
+/* placing_head: place the reference pose of h, whose frames are vertices, and drop what becomes invalid by it. */
 void placing_head(placing *p, vg_head *h);
 /* placing_frame: place a frame of vertices. */
 void placing_frame(const placing *p, vg_frame *f);

@@ -1,6 +1,6 @@
-/* playback.c: the job of vg-play: measures patches or bones, takes their transforms as they come or from a skeleton, edits
- * or interpolates them, and makes vertices of them by one product.
- * Leaves out fitting the map (vg-fitmap) and paths through vectors (vg-interpolate).
+/* playback.c: the job of vg-play: measures patches or bones, or takes their transforms from the input or a skeleton,
+ * edits or interpolates them, and maps them to vertices by one product. Maps are fitted in vg-fitmap; paths through
+ * vectors are in vg-interpolate.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "playback.h"
 #include "batch.h"
@@ -46,7 +46,7 @@ static void take_skeleton(playback *p)
     vg_err e;
     if (p->map.kind != VG_MAP_BONES)
         cli_stop(VG_EINPUT,
-                 "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
+                 "the input is a skeleton, but '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
                  p->o->map);
     if (vg_skeleton_copy(&p->skeleton, &p->h->body.skeleton, &e) < 0 ||
         vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0)
@@ -67,13 +67,13 @@ static void check_input(playback *p)
     if (p->kind == VG_VERTICES && h->body.skeleton.njoints) {
         take_skeleton(p);
     } else if (p->o->driving.align || p->o->driving.joints) {
-        cli_usage("--align and --joints are for a skeleton that comes in, this input holds %s", vg_head_form(h));
+        cli_usage("--align and --joints need a skeleton as input, this input holds %s", vg_head_form(h));
     } else if (p->kind == VG_VERTICES) {
         r = vg_mesh_same(&h->body.mesh, "the sequence", &p->home.body.mesh, name, &e);
     } else if (p->kind != VG_TRANSFORMS) {
         r = vg_fail(&e, VG_EINPUT, "the input holds %s: vg-play takes vertices or transforms", vg_head_form(h));
     } else if (h->count != p->count) {
-        r = vg_fail(&e, VG_EINPUT, "the input has %zu transforms a frame, the map %s takes %zu", h->count, name,
+        r = vg_fail(&e, VG_EINPUT, "the input has %zu transforms per frame, but the map %s needs %zu", h->count, name,
                     p->count);
     }
     if (r < 0) cli_die(&e);
@@ -87,7 +87,7 @@ static void make_head(playback *p)
     if (vg_head_merge_trace(h, &p->home, &e) < 0 || vg_head_copy(&home, &p->home, &e) < 0) cli_die(&e);
     vg_head_take(h, &home, NULL);
     vg_head_clear(&home);
-    if (!p->o->transforms) vg_head_drop(h, "rig"); /* of transforms it says what they move */
+    if (!p->o->transforms) vg_head_drop(h, "rig"); /* with transforms it defines what they move */
     h->kind = p->o->transforms ? VG_TRANSFORMS : VG_VERTICES;
     h->count = p->o->transforms ? p->count : h->body.mesh.nv;
 }
@@ -222,7 +222,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
 
 void playback_run(playback_options *o, vg_source *s)
 {
-    static playback p; /* lives until the end: what it holds goes with the process */
+    static playback p; /* lives until the end; the process releases it */
     static vg_head alone;
     p.o = o, p.most = o->live ? 1 : BATCH;
     step play = {.batch = p.most, .unit = "poses", .init = prepare, .process = play_batch};

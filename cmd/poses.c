@@ -12,7 +12,7 @@ typedef struct gathering {
     bool timed;
 } gathering;
 
-static void gather(void *work, size_t n, vg_frame *f)
+static void gather_poses(void *work, size_t n, vg_frame *f)
 {
     gathering *g = work;
     poses *p = &g->p;
@@ -34,7 +34,7 @@ static void gather(void *work, size_t n, vg_frame *f)
 
 poses poses_read(vg_source *s, size_t most)
 {
-    static const step reading = {.batch = 1, .unit = "poses", .process = gather};
+    static const step reading = {.batch = 1, .unit = "poses", .process = gather_poses};
     const vg_head *h = vg_source_head(s);
     gathering g = {.p = {.numbers = h->count * vg_head_width(h)}, .most = most, .timed = true};
     vg_frame *in = batch_frames(&reading);

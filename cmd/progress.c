@@ -115,7 +115,7 @@ static void print_duration(char *to, size_t size, double seconds)
     else snprintf(to, size, "%llu h %llu min", s / 3600, s / 60 % 60);
 }
 
-static void draw(const char *label, uint64_t n, uint64_t total, double left)
+static void draw_progress(const char *label, uint64_t n, uint64_t total, double left)
 {
     char line[256], duration[40];
     int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s %llu", cli.program->name, label, (unsigned long long)n);
@@ -190,7 +190,7 @@ void cli_progress_of(const char *label, uint64_t n, uint64_t total)
     if (is_due(now)) {
         double left = time_left(n, total, now);
         if (progress.json) print_json(label, n, total, left, now);
-        else if (is_slowest()) draw(label, n, total, left);
+        else if (is_slowest()) draw_progress(label, n, total, left);
         else erase();
     }
     progress.detail[0] = 0;

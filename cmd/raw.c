@@ -19,7 +19,7 @@ bool raw_output(const char *name, size_t *width, char **file)
     return true;
 }
 
-static void store(unsigned char *to, uint64_t bits, size_t width)
+static void store_bits(unsigned char *to, uint64_t bits, size_t width)
 {
     for (size_t i = 0; i < width; i++) to[i] = (unsigned char)(bits >> 8 * i);
 }
@@ -31,7 +31,7 @@ static void store_number(unsigned char *to, double x, size_t width)
     uint64_t bits;
     memcpy(&bits32, &narrow, sizeof bits32);
     memcpy(&bits, &x, sizeof bits);
-    store(to, width == 4 ? bits32 : bits, width);
+    store_bits(to, width == 4 ? bits32 : bits, width);
 }
 
 void raw_write(FILE *f, const vg_frame *from, size_t count, size_t width)

@@ -8,7 +8,7 @@
 /* raw_output: does the name end in ":f32" or ":f64"? Then *width (4 or 8) and *file, the name without it (free with
  * free()). */
 bool raw_output(const char *name, size_t *width, char **file);
-/* raw_write: count numbers of `width` bytes to f. A number that is no finite binary32 ends the program. */
+/* raw_write: write count numbers of `width` bytes to f. A number that is not a finite binary32 ends the program. */
 void raw_write(FILE *f, const vg_frame *from, size_t count, size_t width);
 
 typedef struct raw_input {

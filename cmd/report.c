@@ -77,7 +77,7 @@ static char *copy_text(const char *s)
     return s ? checked(strdup(s)) : NULL;
 }
 
-static report_value keep(report_value v)
+static report_value keep_value(report_value v)
 {
     if (v.type == REPORT_TEXT) {
         v.is.text = copy_text(v.is.text);
@@ -97,7 +97,7 @@ static report_value keep(report_value v)
     return v;
 }
 
-static void drop(report_value *v)
+static void clear_value(report_value *v)
 {
     if (v->type == REPORT_TEXTS)
         for (size_t i = 0; i < v->n; i++) free((void *)(uintptr_t)v->is.texts[i]);
@@ -117,8 +117,8 @@ void report_free(report **r)
     if (!*r) return;
     for (size_t i = 0; i < (*r)->n; i++) {
         item *t = &(*r)->items[i];
-        for (size_t c = 0; c < t->nrows * t->ncolumns; c++) drop(&t->cells[c]);
-        drop(&t->value);
+        for (size_t c = 0; c < t->nrows * t->ncolumns; c++) clear_value(&t->cells[c]);
+        clear_value(&t->value);
         free(t->cells);
         free(t->key);
         free(t->label);
@@ -137,7 +137,7 @@ static item *add_room(report *r)
     return &r->items[r->n++];
 }
 
-static item *add(report *r, item_kind kind, const char *key, const char *label)
+static item *add_item(report *r, item_kind kind, const char *key, const char *label)
 {
     item *t = add_room(r);
     *t = (item){.kind = kind, .key = copy_text(key), .label = copy_text(label)};
@@ -153,7 +153,7 @@ void report_join(report *r, report *more)
 
 void report_put(report *r, const char *key, const char *label, report_value value)
 {
-    add(r, PUT, key, label)->value = keep(value);
+    add_item(r, PUT, key, label)->value = keep_value(value);
 }
 
 void report_note(report *r, const char *format, ...)
@@ -164,28 +164,28 @@ void report_note(report *r, const char *format, ...)
     int n = vasprintf(&text, format, ap);
     va_end(ap);
     checked(n < 0 ? NULL : text);
-    add(r, NOTE, NULL, text);
+    add_item(r, NOTE, NULL, text);
     free(text);
 }
 
 void report_gap(report *r)
 {
-    add(r, NOTE, NULL, "");
+    add_item(r, NOTE, NULL, "");
 }
 
 void report_group(report *r, const char *key)
 {
-    add(r, GROUP, key, NULL);
+    add_item(r, GROUP, key, NULL);
 }
 
 void report_end(report *r)
 {
-    add(r, END, NULL, NULL);
+    add_item(r, END, NULL, NULL);
 }
 
 void report_table(report *r, const char *key, const char *title, bool keyed, const report_column *columns, size_t n)
 {
-    item *t = add(r, TABLE, key, title);
+    item *t = add_item(r, TABLE, key, title);
     t->keyed = keyed, t->columns = columns, t->ncolumns = n;
 }
 
@@ -196,14 +196,14 @@ void report_row(report *r, const report_value *cells)
         t->cap = t->cap ? 2 * t->cap : 16;
         t->cells = checked(reallocarray(t->cells, t->cap * t->ncolumns, sizeof *t->cells));
     }
-    for (size_t c = 0; c < t->ncolumns; c++) t->cells[t->nrows * t->ncolumns + c] = keep(cells[c]);
+    for (size_t c = 0; c < t->ncolumns; c++) t->cells[t->nrows * t->ncolumns + c] = keep_value(cells[c]);
     t->nrows++;
 }
 
 /* ----------------------------------------------------------------------------------------------- text -- */
 
 /* A value as text; caller frees it. */
-static char *shown(const report_value *v)
+static char *value_text(const report_value *v)
 {
     cli_line line;
     FILE *f = cli_line_open(&line, "the report");
@@ -260,7 +260,7 @@ static size_t print_values(const report *r, size_t first, FILE *f)
         if (in_text(&r->items[end]) && width_of(r->items[end].label) > width) width = width_of(r->items[end].label);
     for (size_t i = first; i < end; i++) {
         if (!in_text(&r->items[i])) continue;
-        char *text = shown(&r->items[i].value);
+        char *text = value_text(&r->items[i].value);
         fputs(r->items[i].label, f);
         if (*text) print_blanks(f, width - width_of(r->items[i].label) + 2);
         fprintf(f, "%s\n", text);
@@ -303,7 +303,7 @@ static void print_table(const item *t, FILE *f)
     int *width = checked(calloc(n + 1, sizeof *width));
     bool *numeric = checked(calloc(n + 1, sizeof *numeric));
     for (size_t i = 0; i < total; i++) {
-        text[i] = i < n ? copy_text(t->columns[i].title ? t->columns[i].title : "") : shown(&t->cells[i - n]);
+        text[i] = i < n ? copy_text(t->columns[i].title ? t->columns[i].title : "") : value_text(&t->cells[i - n]);
         if (width_of(text[i]) > width[i % n]) width[i % n] = width_of(text[i]);
     }
     for (size_t c = 0; c < n; c++) numeric[c] = is_numeric(t, c);

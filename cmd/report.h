@@ -12,7 +12,7 @@
 
 typedef struct report report;
 
-/* A value: a cell of a table or a line of its own. Texts and lists are copied. */
+/* A value: a cell of a table or a separate line. Texts and lists are copied. */
 typedef enum report_type { REPORT_NOTHING, REPORT_TEXT, REPORT_COUNT, REPORT_NUMBER, REPORT_FLAG, REPORT_TEXTS,
                            REPORT_COUNTS, REPORT_NUMBERS } report_type;
 typedef struct report_value {

@@ -30,7 +30,7 @@ typedef struct choosing {
     size_t n;
 } choosing;
 
-static void *room(size_t n, size_t size)
+static void *choice_array(size_t n, size_t size)
 {
     return cli_allocate(n, size, "the choice of a map");
 }
@@ -135,9 +135,9 @@ static double find_shares(const vg_mesh *m, const candidate *c, double *share, d
 static void choose_best(const choosing *x, rig_choice *choice)
 {
     const vg_mesh *m = &x->f->h->body.mesh;
-    double *share = room(m->nv, sizeof *share), *smoothed = room(2 * m->nv, sizeof *smoothed),
-           *work = room(2 * m->nv, sizeof *work), best = 0;
-    choice->share = room(m->nv, sizeof *choice->share);
+    double *share = choice_array(m->nv, sizeof *share), *smoothed = choice_array(2 * m->nv, sizeof *smoothed),
+           *work = choice_array(2 * m->nv, sizeof *work), best = 0;
+    choice->share = choice_array(m->nv, sizeof *choice->share);
     choice->mean = 0, choice->folds = x->folds;
     choice->bones_per_corner = x->at[0].bones_per_corner, choice->refine = x->at[0].refine;
     for (size_t c = 0; c < x->n; c++) {
@@ -161,7 +161,7 @@ static void list_candidates(choosing *x, const vg_rig_options *o, bool corners_g
     for (size_t corners = o->bones_per_corner + 1; corners-- > least;)
         for (size_t i = 0; i < (refine_given ? 1 : 3); i++)
             x->at[x->n++] = (candidate){corners, refine_given ? o->refine : strengths[i],
-                                        room(2 * h->body.mesh.nv, sizeof(double))};
+                                        choice_array(2 * h->body.mesh.nv, sizeof(double))};
 }
 
 void rig_choose(const fitting *f, double *const *transforms, const vg_rig_options *o, bool corners_given,
@@ -169,12 +169,12 @@ void rig_choose(const fitting *f, double *const *transforms, const vg_rig_option
 {
     choosing x = {.f = f, .transforms = transforms};
     size_t nv = f->h->body.mesh.nv;
-    x.rank = room(f->n, sizeof *x.rank);
+    x.rank = choice_array(f->n, sizeof *x.rank);
     for (size_t i = 0; i < f->n; i++)
         if (!fitting_is_held_out(f, i)) x.rank[i] = x.fitted++;
     x.folds = x.fitted < FOLDS ? x.fitted : FOLDS;
     for (int way = 0; way < 2; way++)
-        for (size_t i = 0; i < FITTING_BATCH; i++) x.out[way][i] = room(3 * nv, sizeof(double));
+        for (size_t i = 0; i < FITTING_BATCH; i++) x.out[way][i] = choice_array(3 * nv, sizeof(double));
     list_candidates(&x, o, corners_given, refine_given);
     for (x.fold = 0; x.fold < x.folds && x.folds > 1; x.fold++) {
         cli_progress_of("folds", x.fold, x.folds);

@@ -1,5 +1,5 @@
-/* rigging.c: --skeleton and --groups of vg-fitmap: poses and what is known of a skeleton become a rig and its map.
- * Leaves out maps of patches (vg-fitmap.c) and driving a rig (playback.c).
+/* rigging.c: --skeleton and --groups of vg-fitmap: fits a rig and its map to poses and a skeleton, known or not. Maps
+ * of patches are in vg-fitmap.c, rigs are driven in playback.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "rigging.h"
 #include "rig_choice.h"
@@ -58,7 +58,7 @@ typedef struct work {
     fitting_errors errors[2][2]; /* envelope, skinning; fitted, left out */
 } work;
 
-static void *room(size_t n, size_t size)
+static void *rig_array(size_t n, size_t size)
 {
     return cli_allocate(n, size, "the rig and its poses");
 }
@@ -149,9 +149,8 @@ static void locate_root(work *w, double *positions)
     cli_note("the root of the skeleton is at %.6g %.6g %.6g in the reference pose, the vertices agree to %.2g D",
              positions[0], positions[1], positions[2], d > 0 ? spread / d : 0);
     if (d > 0 && spread > 0.05 * d)
-        cli_warn("the vertices do not agree about where the skeleton is in the reference pose (%.2g D): does its "
-                 "motion belong to these "
-                 "poses? if not, --learn",
+        cli_warn("the vertices disagree about the position of the skeleton in the reference pose (%.2g D): does its "
+                 "motion belong to these poses? if not, --learn",
                  spread / d);
 }
 
@@ -173,7 +172,8 @@ static void warn_outside(const work *w)
     }
     if (2 * outside > r->nbones)
         cli_warn(
-            "%zu of %zu bones are outside of the mesh in the reference pose: say where the root is with --root-at",
+            "%zu of %zu bones are outside the mesh in the reference pose: give the position of the root with "
+            "--root-at",
             outside, r->nbones);
 }
 
@@ -183,7 +183,7 @@ static void place_skeleton(work *w)
     vg_err e;
     const motion *m = &w->given;
     size_t joints = m->skeleton.njoints;
-    double *positions = room(3 * joints, sizeof *positions), *turns = room(4 * joints, sizeof *turns);
+    double *positions = rig_array(3 * joints, sizeof *positions), *turns = rig_array(4 * joints, sizeof *turns);
     bool known = m->n == w->poses.n && !w->o->learn;
     vg_skeleton_pose(&m->skeleton, NULL, positions, turns);
     if (!known && !w->o->learn && m->n > 1)
@@ -201,8 +201,8 @@ static void place_skeleton(work *w)
     if (w->o->has_root) {
         move_root(&m->skeleton, w->o->root_at, positions);
     } else if (!known && m->n > 1) {
-        cli_warn("the root of the skeleton is taken to be at its offset, %g %g %g, in the reference pose: --root-at "
-                 "says otherwise",
+        cli_warn("the root of the skeleton is assumed at its offset, %g %g %g, in the reference pose: --root-at "
+                 "changes this",
                  positions[0], positions[1], positions[2]);
     }
     if (vg_rig_make(&w->h->body.rig, &m->skeleton, positions, turns, &e) < 0) cli_die(&e);
@@ -215,7 +215,7 @@ static void place_skeleton(work *w)
     if (vg_rig_learn(&w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, w->nsample, (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
         vg_inverse_skin_new(&w->inverse, &w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, cli.threads, &e) < 0)
         cli_die(&e);
-    cli_note("the motion of the bones is learned from %zu poses: what skinning leaves is %.3g D", w->nsample,
+    cli_note("the motion of the bones was learned from %zu poses: residual of skinning %.3g D", w->nsample,
              d > 0 ? miss / d : 0);
 }
 
@@ -229,7 +229,7 @@ static void read_groups(work *w)
     if (vg_joint_groups_read(&w->groups, text, n, 0, name, &e) < 0 ||
         vg_joint_groups_skeleton(&w->groups, w->h->body.mesh.nv, w->h->body.reference, &s, &e) < 0)
         cli_die(&e);
-    double *positions = room(3 * s.njoints, sizeof *positions), *turns = room(4 * s.njoints, sizeof *turns);
+    double *positions = rig_array(3 * s.njoints, sizeof *positions), *turns = rig_array(4 * s.njoints, sizeof *turns);
     vg_skeleton_pose(&s, NULL, positions, turns);
     if (vg_rig_make(&w->h->body.rig, &s, positions, turns, &e) < 0) cli_die(&e);
     vg_skeleton_clear(&s);
@@ -249,8 +249,8 @@ static void find_bones(work *w)
         vg_free_bones_new(&w->free, &w->h->body.rig, nv, w->h->body.reference, cli.threads, &e) < 0)
         cli_die(&e);
     if (w->h->body.rig.nbones < wanted)
-        cli_note("%zu bones are all that the poses tell apart, %zu were asked for", w->h->body.rig.nbones, wanted);
-    cli_note("the bones are found in %zu poses: what skinning leaves is %.3g D", w->nsample, d > 0 ? miss / d : 0);
+        cli_note("%zu bones are all that the poses determine, %zu were requested", w->h->body.rig.nbones, wanted);
+    cli_note("the bones were found in %zu poses: residual of skinning %.3g D", w->nsample, d > 0 ? miss / d : 0);
 }
 
 /* ---- the fit ---- */
@@ -271,7 +271,7 @@ static void measure_transforms(work *w, const fitting_batch *b)
         return;
     }
     double *positions = NULL, *turns = NULL;
-    if (w->o->groups) positions = room(3 * joints, sizeof *positions), turns = room(4 * joints, sizeof *turns);
+    if (w->o->groups) positions = rig_array(3 * joints, sizeof *positions), turns = rig_array(4 * joints, sizeof *turns);
     for (size_t i = 0; i < b->n; i++) {
         size_t k = first + i;
         if (w->o->groups) {
@@ -302,7 +302,7 @@ static void fit_batch(void *context, const fitting_batch *b)
 {
     work *w = context;
     for (size_t i = 0; i < b->n; i++)
-        w->transforms[b->index[i]] = room(7 * w->h->body.rig.nbones, sizeof(double));
+        w->transforms[b->index[i]] = rig_array(7 * w->h->body.rig.nbones, sizeof(double));
     measure_transforms(w, b);
     add_again(w, b);
     cli_progress_of("poses fitted", b->index[b->n - 1] + 1, w->poses.n);
@@ -318,7 +318,7 @@ static void judge_batch(void *context, const fitting_batch *b)
     work *w = context;
     size_t nv = w->h->body.mesh.nv;
     for (size_t i = 0; i < b->n; i++)
-        if (!vertices[i]) vertices[i] = room(3 * nv, sizeof(double));
+        if (!vertices[i]) vertices[i] = rig_array(3 * nv, sizeof(double));
     for (int method = 0; method < 2; method++) {
         if (!players[method]) continue;
         vg_player_pose(players[method], b->n, (const double *const *)w->transforms + b->index[0], vertices);
@@ -347,7 +347,7 @@ static void report_choice(const rig_choice *c)
     else cli_say("mixed by %zu held-out blocks of poses: skinning alone", c->folds);
 }
 
-static void report(work *w)
+static void report_fit(work *w)
 {
     vg_err e;
     static const char *const names[2][2] = {{"envelope, fitted", "envelope, left out"},
@@ -360,7 +360,7 @@ static void report(work *w)
         if (w->maps[i].n && vg_player_new(&players[i], &w->h->body, &w->maps[i], false, cli.threads, &e) < 0) cli_die(&e);
     for (int i = 0; i < 4; i++) {
         fitting_errors *x = &w->errors[i / 2][i % 2];
-        x->first = room(nv, sizeof *x->first), x->second = room(nv, sizeof *x->second);
+        x->first = rig_array(nv, sizeof *x->first), x->second = rig_array(nv, sizeof *x->second);
     }
     fitting_pass(&w->poses, NULL, judge_batch, w);
     cli_say("%zu bones, %zu vertices, %zu poses; errors in 1e-3 D:  mean  sigma largest", w->h->body.rig.nbones, nv,
@@ -377,7 +377,7 @@ static void report(work *w)
 }
 
 /* The map by one method, and the weights of the bones, which are the same for both. */
-static void finish(work *w, vg_rig_method method)
+static void finish_map(work *w, vg_rig_method method)
 {
     vg_err e;
     vg_rig rig;
@@ -386,7 +386,7 @@ static void finish(work *w, vg_rig_method method)
     vg_head_put(w->h, &rig, "rig");
 }
 
-static void fit(work *w)
+static void fit_rig(work *w)
 {
     vg_err e;
     vg_head *h = w->h;
@@ -395,9 +395,9 @@ static void fit(work *w)
                         .refine = w->o->refine < 0 ? 0.003 : w->o->refine,
                         .threads = cli.threads};
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_rig_fitter_new(&rig_fitter, h, &o, &e) < 0) cli_die(&e);
-    w->transforms = room(w->poses.n, sizeof *w->transforms);
+    w->transforms = rig_array(w->poses.n, sizeof *w->transforms);
     fitting_pass(&w->poses, NULL, fit_batch, w);
-    finish(w, VG_RIG_LBS);
+    finish_map(w, VG_RIG_LBS);
     if (by_choice(w->o)) {
         vg_rig_fitter_free(&rig_fitter);
         rig_choose(&w->poses, w->transforms, &o, w->o->bones_per_corner > 0, w->o->refine >= 0, &w->choice);
@@ -405,14 +405,14 @@ static void fit(work *w)
         if (vg_rig_fitter_new(&rig_fitter, h, &o, &e) < 0) cli_die(&e);
         fitting_pass(&w->poses, NULL, add_again, w);
     }
-    if (!by_skinning(w->o)) finish(w, VG_RIG_ENVELOPE);
+    if (!by_skinning(w->o)) finish_map(w, VG_RIG_ENVELOPE);
     if (by_choice(w->o)) mix_rows(&w->maps[VG_RIG_ENVELOPE], &w->maps[VG_RIG_LBS], w->choice.share);
     vg_rig_fitter_free(&rig_fitter);
 }
 
 void rigging_run(vg_source *s, const rigging_options *o)
 {
-    static work w; /* lives until the end: what it holds goes with the process */
+    static work w; /* lives until the end; the process releases it */
     w.o = o;
     w.h = vg_source_head(s);
     if (w.h->body.skeleton.njoints) cli_stop(VG_EINPUT, "the input is a skeleton: vg-fitmap takes poses of a mesh");
@@ -425,8 +425,8 @@ void rigging_run(vg_source *s, const rigging_options *o)
     if (o->groups) read_groups(&w);
     else if (o->bones) find_bones(&w);
     else place_skeleton(&w);
-    fit(&w);
-    report(&w);
+    fit_rig(&w);
+    report_fit(&w);
     vg_head_put(w.h, &w.maps[by_skinning(o) ? VG_RIG_LBS : VG_RIG_ENVELOPE], "map");
     fitting_clear(&w.poses);
 }

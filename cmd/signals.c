@@ -26,7 +26,7 @@ void report_signal(report *r, const vg_signal *s)
     report_put(r, "dimension", "dimension", report_count(s->d));
     report_put(r, "basis_bits", "basis bits", report_count(s->bits));
     report_put(r, "rooted", NULL, report_flag(s->rooted));
-    report_put(r, NULL, "root", report_text(s->rooted ? "a signal of its own" : "in the shapes"));
+    report_put(r, NULL, "root", report_text(s->rooted ? "a separate signal" : "in the shapes"));
     report_put(r, "layout", "layout", report_text(layouts[s->layout]));
     report_put(r, "layout_weight", NULL, report_number(s->layout_weight));
     report_put(r, "layout_ratio", "deviation", report_number(s->layout_ratio));
@@ -65,6 +65,6 @@ void write_curve(FILE *f, const vg_signal *s, double diagonal)
         fprintf(f, "%.17g %.17g # %g %.3g\n", t.position[2 * i], t.position[2 * i + 1], 1 + (double)i / PARTS,
                 diagonal > 0 ? t.deviation[i] / diagonal : 0);
     for (size_t i = 0; i < t.ncrossings; i++)
-        fprintf(f, "# the curve is at one place at the times %.6g and %.6g\n", t.crossing[2 * i], t.crossing[2 * i + 1]);
+        fprintf(f, "# the curve crosses itself at the times %.6g and %.6g\n", t.crossing[2 * i], t.crossing[2 * i + 1]);
     vg_trace_clear(&t);
 }

@@ -1,4 +1,4 @@
-/* solve_features.c: frames of features back to vertices (MATH 12). Leaves out how they are measured (vg-features.c).
+/* solve_features.c: converts frames of features to vertices (MATH 12). Features are measured in vg-features.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "solve_features.h"
 #include "batch.h"
@@ -71,7 +71,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
 /* ---- frames ---- */
 
 /* NULL: the frame has no such channel; one of another shape stops the program. */
-static const double *find(const vg_frame *f, const char *name, size_t width, size_t count)
+static const double *find_channel(const vg_frame *f, const char *name, size_t width, size_t count)
 {
     const vg_channel *c = vg_frame_channel(f, name);
     if (!c) return NULL;
@@ -84,11 +84,11 @@ static const double *find(const vg_frame *f, const char *name, size_t width, siz
 /* Normalise: learners do not keep quaternions at length 1. NULL: no rotation. */
 static const double *find_root(const vg_frame *f, double unit[4])
 {
-    const double *q = find(f, FEATURES_ROOT, 4, 1);
+    const double *q = find_channel(f, FEATURES_ROOT, 4, 1);
     if (!q) return NULL;
     double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     if (!(length > 1e-6) || !isfinite(length))
-        cli_stop(VG_EINPUT, "frame '%s' has a '%s' that is no rotation: its length is %g", f->name, FEATURES_ROOT, length);
+        cli_stop(VG_EINPUT, "frame '%s' has a '%s' that is not a rotation: its length is %g", f->name, FEATURES_ROOT, length);
     for (int k = 0; k < 4; k++) unit[k] = fabs(length - 1) < 1e-15 ? q[k] : q[k] / length;
     return unit;
 }
@@ -100,7 +100,7 @@ static void solve_batch(void *context, size_t n, vg_frame *in)
     for (size_t i = 0; i < n; i++) {
         w->values[i] = in[i].values;
         w->roots[i] = find_root(&in[i], w->root[i]);
-        w->centroids[i] = find(&in[i], FEATURES_CENTROIDS, 3, w->parts);
+        w->centroids[i] = find_channel(&in[i], FEATURES_CENTROIDS, 3, w->parts);
         if (w->centroids[i]) continue;
         w->centroids[i] = w->rest;
         w->unplaced++;
@@ -112,7 +112,7 @@ static void solve_batch(void *context, size_t n, vg_frame *in)
     }
 }
 
-static void clear(work *w)
+static void clear_work(work *w)
 {
     for (size_t i = 0; i < w->most; i++) vg_frame_clear(&w->out[i]);
     free(w->out);
@@ -133,5 +133,5 @@ void features_solve(vg_source *s)
     if (w.unplaced)
         cli_warn("%llu frames have no '%s': their components are where the reference pose has them",
                  (unsigned long long)w.unplaced, FEATURES_CENTROIDS);
-    clear(&w);
+    clear_work(&w);
 }

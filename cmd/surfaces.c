@@ -1,5 +1,5 @@
 /* surfaces.c: vg-diff --surface: the distance between the surfaces of two sequences, frame by frame, and its report.
- * Leaves out the distance itself (lib/method/pairs/distance.c).
+ * The distance is computed in lib/method/pairs/distance.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "surfaces.h"
 #include "cli.h"
@@ -74,9 +74,9 @@ void surfaces_report(const surfaces *s, report *r, double found[4])
     report_put(r, "hausdorff", "Hausdorff", report_number(found[3]));
     report_put(r, "hausdorff_D", NULL, report_number(in_D(found[3], s->diagonal)));
     report_gap(r);
-    report_note(r, "From each point of one surface to the nearest point of the other, each frame by itself; weighted by area.");
-    report_note(r, "p95: 95 %% of the surface are nearer. Hausdorff: the largest of both ways.");
-    report_note(r, "A hole or a part that only one of the two has shows in one way alone.");
+    report_note(r, "From each point of one surface to the nearest point of the other, per frame; weighted by area.");
+    report_note(r, "p95: 95 %% of the surface are nearer. Hausdorff: the larger of both directions.");
+    report_note(r, "A hole or a part that only one of the two has shows in one direction only.");
     report_note(r, "D: the diagonal of the box around the reference pose of the truth, %.6g mesh units.", s->diagonal);
 }
 

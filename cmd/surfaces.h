@@ -15,7 +15,8 @@ typedef struct surfaces {
 void surfaces_begin(surfaces *s, const vg_body *truth, const vg_body *result, report *frames);
 /* surfaces_add: frame i of both. The distance of each vertex of the result, valid until the next call. */
 const double *surfaces_add(surfaces *s, size_t i, const char *name, const double *truth, const double *result);
-/* surfaces_report: the two ways and what is said of them. found: mean, rms, p95, max, the larger of both ways. */
+/* surfaces_report: both directions, and their explanation. found: mean, rms, p95, max, the larger of both
+ * directions. */
 void surfaces_report(const surfaces *s, report *r, double found[4]);
 void surfaces_end(surfaces *s);
 

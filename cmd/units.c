@@ -1,4 +1,4 @@
-/* units.c: units of length on the command line. Leaves out what they are used for.
+/* units.c: units of length on the command line.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "units.h"
 

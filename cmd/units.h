@@ -6,7 +6,7 @@
 #include <stddef.h>
 
 #define UNITS_LIST "mm, cm, dm, m, km, in and ft"
-/* unit_metres: how long the unit with this name of n bytes is, in metres; 0: there is no such unit. */
+/* unit_metres: length in metres of the unit with this name of n bytes; 0 if there is no such unit. */
 double unit_metres(const char *name, size_t n);
 
 #endif

@@ -23,15 +23,15 @@ static const cli_option options[] = {
     {"fps", 0, "N", "give the frames times, N a second, from 0", .number = &fps, .least = 1e-6, .most = 1e9},
     {"replace", 0, NULL, "replace the mesh files that are in the directory, or have the pattern's names, as a whole",
      .flag = &sink_options.replace},
-    {"first-number", 0, "N", "what %d in the output's name starts at (default 0)", .integer = &first_number,
+    {"first-number", 0, "N", "the first number for %d in the output's name (default 0)", .integer = &first_number,
      .least = 0, .most = 1e9},
-    {"mesh", 0, "MESH", "where the mesh of a point cache or array goes; default: beside it, as NAME.obj",
+    {"mesh", 0, "MESH", "file for the mesh of a point cache or array; default: beside it, as NAME.obj",
      .text = &sink_options.mesh},
     {"no-mesh", 0, NULL, "write no mesh beside a point cache or array", .flag = &sink_options.no_mesh},
     {"drop-loose", 0, NULL, "leave out the vertices that are in no face", .flag = &sink_options.drop_loose},
-    {"max-targets", 0, "N", "morph targets of a GLB or glTF, at most: frames are mixed from so many",
+    {"max-targets", 0, "N", "most morph targets of a GLB or glTF, from which frames are mixed",
      .integer = &most_targets, .least = 1, .most = 1e6},
-    {"morph-tolerance", 0, "X", "how far mixing may take a vertex from its place, in D (default 0.001)",
+    {"morph-tolerance", 0, "X", "largest error of a vertex by mixing, in D (default 0.001)",
      .number = &sink_options.morph_tolerance, .least = 1e-7, .most = 1},
     {"no-normals", 0, NULL, "leave out the normals of a GLB or glTF that the input does not have: a smaller file",
      .flag = &sink_options.no_normals},
@@ -39,7 +39,7 @@ static const cli_option options[] = {
      .flag = &sink_options.shapes},
     {"quantize", 0, NULL, "positions of a GLB or glTF of 16 bits, normals of 8: about half the size",
      .flag = &sink_options.quantize},
-    {"name", 0, "NAME", "what the animation of a GLB or glTF is called", .text = &sink_options.name},
+    {"name", 0, "NAME", "name of the animation in a GLB or glTF", .text = &sink_options.name},
     {.name = NULL}};
 
 static const cli_program program = {
@@ -155,7 +155,7 @@ static void say_report(void)
     if (report && (cli.verbose || (inexact && chosen))) cli_say("%s", report);
 }
 
-static void decode(vg_source *s)
+static void decode_frames(vg_source *s)
 {
     static const step writing = {.batch = 1, .unit = "poses", .process = put_frames};
     vg_err e;
@@ -200,7 +200,7 @@ int main(int argc, char **argv)
         cli_usage("--first-number is for files with numbers, such as 'pose-%%04d.obj': '%s' has none", output);
     vg_source *s = cli_source(operands, n);
     if (raw) decode_raw(s, raw);
-    else decode(s);
+    else decode_frames(s);
     free(file);
     vg_source_close(&s);
     cli_finish(0);

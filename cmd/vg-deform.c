@@ -18,17 +18,18 @@ static struct {
 static const cli_option options[] = {
     {"onto", 0, "MESH", "apply to this mesh and write its vectors; without it, write the deformations",
      .text = &opts.onto, .reads = true},
-    {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found",
+    {"correspondence", 0, "FILE", "for a target with another connectivity: the output of vg-register",
      .text = &opts.correspondence, .reads = true, .needs = "onto"},
-    {"by", 0, "blend|pose|gradient|shape", "what is carried over (default: blend; gradient with --correspondence)",
+    {"by", 0, "blend|pose|gradient|shape", "what is transferred (default: blend; gradient with --correspondence)",
      .choice = &opts.by_choice, .needs = "onto"},
     {"root", 0, "centroid|stay|V",
-     "where the body goes: as the centroid does (default), nowhere, or as vertex V does", .text = &opts.root,
+     "motion of the body: that of the centroid (default), none, or that of vertex V", .text = &opts.root,
      .needs = "onto"},
     {"pin", 0, "auto|always|none",
-     "hold what does not move in the source: where it is much of the mesh (default), ...",
+     "hold what does not move in the source: if it is much of the mesh (default), ...",
      .choice = &opts.pin_choice, .needs = "onto"},
-    {"examples", 0, "POSES SCULPTED", "poses of the sequence's body, and the same ones of the target: the transfer meets them",
+    {"examples", 0, "POSES SCULPTED", "poses of the source, and the same poses of the target, which the transfer "
+                                      "reproduces",
      .text = &opts.examples, .second = &opts.sculpted, .reads = true, .needs = "onto"},
     {"align", 0, "auto|none|all|NAMES",
      "two skeletons: make limbs that rest in other directions point alike: those of arms and legs that do (default), none, "
@@ -52,7 +53,7 @@ static const cli_moved moved[] = {{"interpolate", "is now the program vg-interpo
 static const cli_program program = {
     .name = "vg-deform",
     .synopsis = "[options] [FILE]",
-    .summary = "measure how each vector of a sequence deforms, and do the same to another mesh",
+    .summary = "measure the deformations of a sequence, and apply them to another mesh",
     .options = options,
     .moved = moved,
     .most_operands = 1,
@@ -62,7 +63,7 @@ static const cli_program program = {
 
 enum { BATCH = 8, MOST_EXAMPLES = 1000 }; /* poses of one call: the lanes of the kernels */
 
-/* How poses become what is written. */
+/* How the output is computed from the poses. */
 typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE, RIDE, JOINTS } way;
 typedef enum by { BY_BLEND, BY_POSE, BY_GRADIENT, BY_SHAPE } by;
 typedef enum pin { PIN_AUTO, PIN_ALWAYS, PIN_NONE } pin;
@@ -206,7 +207,7 @@ static void warn_degenerate(void *context)
     vg_deform_stats c = {0};
     if (w->deformer) c = vg_deformer_get_stats(w->deformer);
     if (c.corners)
-        cli_warn("%llu corners without a direction took the turn of their face (the first in face %llu)",
+        cli_warn("%llu corners without a direction took the rotation of their face (the first in face %llu)",
                  (unsigned long long)c.corners, (unsigned long long)c.first_face);
     if (!w->carrier) return;
     c = vg_cross_transfer_get_stats(w->carrier);
@@ -223,7 +224,7 @@ static void check_kind(work *w)
     if (w->kind == VG_DEFORMATIONS && !cli_given("by")) w->by = BY_POSE;
     if (opts.correspondence && !cli_given("by")) w->by = BY_GRADIENT;
     if (w->kind == VG_FEATURES || w->kind == VG_COORDINATES) advice = "vg-deform takes vertices, vectors or deformations";
-    else if (w->kind == VG_TRANSFORMS) advice = "make vertices of them with 'vg-play MAP' first";
+    else if (w->kind == VG_TRANSFORMS) advice = "convert them to vertices with 'vg-play MAP' first";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";
     else if (w->kind == VG_DEFORMATIONS && w->by != BY_POSE) advice = "they go --by pose only";
     else if (w->kind != VG_VERTICES && (w->by == BY_SHAPE || opts.correspondence))
@@ -238,7 +239,7 @@ static void load_target(work *w)
     if (opts.correspondence) cli_load(&w->pairs, opts.correspondence, "correspondence");
 }
 
-static bool fits(const work *w, const vg_head *target)
+static bool fits_target(const work *w, const vg_head *target)
 {
     return vg_mesh_same(&w->h->body.mesh, "", &target->body.mesh, "", NULL) == VG_OK;
 }
@@ -249,9 +250,9 @@ static void weld_like_sequence(work *w)
     const vg_source_options like = {.reading.like = &w->h->body};
     struct stat st;
     vg_head again = {0};
-    if (!opts.onto || opts.correspondence || fits(w, &w->target) || stat(opts.onto, &st) < 0 || !S_ISREG(st.st_mode))
+    if (!opts.onto || opts.correspondence || fits_target(w, &w->target) || stat(opts.onto, &st) < 0 || !S_ISREG(st.st_mode))
         return;
-    if (vg_load_with(&again, opts.onto, "mesh", &like, NULL, NULL) == VG_OK && fits(w, &again)) {
+    if (vg_load_with(&again, opts.onto, "mesh", &like, NULL, NULL) == VG_OK && fits_target(w, &again)) {
         vg_head_move(&w->target, &again);
     }
     vg_head_clear(&again);
@@ -325,8 +326,8 @@ static void warn_of_other_pose(const work *w)
     double degrees = w->carrier ? vg_cross_transfer_turned(w->carrier) : degrees_apart(w), most = w->carrier ? 45 : 30;
     if (degrees > most)
         cli_warn(
-            "the target does not stand as the reference pose '%s' does: they differ by %.0f degrees on average; name "
-            "a pose that stands as the target does with 'vg-encode --reference', or turn the target",
+            "the target is not in the reference pose '%s': they differ by %.0f degrees on average; give a reference "
+            "in the target's pose with 'vg-encode --reference', or rotate the target",
             w->h->body.reference_name, degrees);
 }
 
@@ -358,7 +359,7 @@ static void find_sculpted(work *w, const poses *p)
         if (fabs(p->values[i] - b->reference[i % p->numbers]) > near) w->sculpted[i % p->numbers / 3] = true;
 }
 
-/* Plain transfer of the examples says what it misses in them. */
+/* Plain transfer of the examples gives its error in them. */
 static void make_corrector(work *w)
 {
     vg_err e;
@@ -368,7 +369,7 @@ static void make_corrector(work *w)
     poses from = poses_load(opts.examples, MOST_EXAMPLES, &w->source.body.mesh, w->h);
     poses to = poses_load(opts.sculpted, MOST_EXAMPLES, &w->target.body.mesh, w->h);
     if (from.n != to.n || !from.n)
-        cli_stop(VG_EINPUT, "'%s' has %zu poses and '%s' %zu: they must be the same ones", opts.examples, from.n, opts.sculpted, to.n);
+        cli_stop(VG_EINPUT, "'%s' has %zu poses and '%s' %zu: they must match", opts.examples, from.n, opts.sculpted, to.n);
     const double **source = cli_allocate(from.n, sizeof *source, "examples"), **target = cli_allocate(from.n, sizeof *target, "examples");
     double **made = cli_allocate(from.n, sizeof *made, "examples");
     for (size_t i = 0; i < from.n; i++) {
@@ -428,7 +429,8 @@ static void make_step(work *w)
     make_corrector(w);
 }
 
-/* The output's head: the sequence's provenance and records, the target's mesh, reference and what its file said. */
+/* The output's head: the provenance and records of the sequence; mesh and reference of the target, and what its file
+ * contains. */
 static void make_head(work *w)
 {
     vg_err e;
@@ -440,7 +442,7 @@ static void make_head(work *w)
         vg_head_take(h, t, "asset");
         vg_head_take(h, t, "skeleton");
     }
-    vg_head_drop(h, "map"); /* it is no property of the mesh */
+    vg_head_drop(h, "map"); /* not a property of the mesh */
     if (w->way == CARRY || w->way == RIDE || w->way == JOINTS) {
         vg_head_drop(h, "patches");
         vg_head_take(h, t, "mesh");
@@ -477,7 +479,7 @@ static bool pairs_joints(const work *w)
         if (asked) cli_usage("--align and --joints are for a skeleton and poses of another one");
         return false;
     }
-    bool same = a->njoints == b->njoints && fits(w, &w->target);
+    bool same = a->njoints == b->njoints && fits_target(w, &w->target);
     for (size_t j = 0; same && j < a->njoints; j++) same = !strcmp(a->joints[j].name, b->joints[j].name);
     return asked || !same;
 }
@@ -522,7 +524,7 @@ int main(int argc, char **argv)
 {
     static const step deform = {
         .batch = BATCH, .unit = "poses", .init = prepare, .process = deform_batch, .finish = warn_degenerate};
-    static work w; /* lives until the end: what it holds goes with the process */
+    static work w; /* lives until the end; the process releases it */
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     parse_options(&w);

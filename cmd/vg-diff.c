@@ -1,6 +1,6 @@
-/* vg-diff.c: measure how far a sequence is from the truth, and answer whether that is within a tolerance; the error
- * of each vertex goes into a stream. Leaves out the measures themselves (lib/model/measures.c) and pictures of the
- * error (vg-view).
+/* vg-diff.c: measures the distance of a sequence from the truth, and answers whether it is within a tolerance; the
+ * error of each vertex can be written to a stream. Measures are in lib/model/measures.c; vg-view draws pictures of
+ * the error.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "error_plot.h"
@@ -50,27 +50,26 @@ static const cli_option options[] = {
     {.name = "tolerance", .letter = 't', .value = "X[UNIT]",
      .help = "exit 1 when the error exceeds X, in units of D, in per cent of it, or in a unit of length",
      .take = take_tolerance},
-    {.name = "unit", .value = "UNIT", .help = "what a unit of the meshes is, for such a tolerance (default: m)",
+    {.name = "unit", .value = "UNIT", .help = "the unit of the meshes, for such a tolerance (default: m)",
      .text = &opts.unit, .needs = "tolerance"},
-    {.name = "surface", .help = "the distance between the surfaces, both ways, whatever their vertices and faces",
+    {.name = "surface", .help = "measure between the surfaces, in both directions, with any vertices and faces",
      .flag = &opts.surface, .excludes = "centred|plot"},
-    {.name = "of", .value = "mean|rms|p95|max", .help = "the error it is about (default: max)",
+    {.name = "of", .value = "mean|rms|p95|max", .help = "the error to which it applies (default: max)",
      .text = &opts.of, .choice = &opts.which, .needs = "tolerance"},
     {.name = "centred", .letter = 'c', .help = "move the centroid of every pose to 0 before comparing",
      .flag = &opts.centred},
     {.name = "frames", .help = "list the error of every frame", .flag = &opts.frames},
     {.name = "heat", .value = "FILE", .text = &opts.heat,
-     .help = "write RESULT with the error of each vertex as a stream, which vg-view colours; "
-             "'-': instead of the report"},
+     .help = "write RESULT with the error of each vertex as a stream for vg-view; '-': instead of the report"},
     {.name = "plot", .value = "FILE", .text = &opts.plot,
-     .help = "draw the errors of the frames, and how many vertices have which, as FILE.svg or FILE.png"},
+     .help = "draw the errors of the frames, and their distribution, as FILE.svg or FILE.png"},
     {0},
 };
 
 static const cli_program program = {
     .name = "vg-diff",
     .synopsis = "[options] TRUTH RESULT",
-    .summary = "measure how far the poses of RESULT are from those of TRUTH",
+    .summary = "measure the distance of the poses of RESULT from those of TRUTH",
     .options = options,
     .most_operands = 2,
     .writes_text = true,
@@ -158,7 +157,7 @@ static void open_side(side *s, char *operand)
     cli_need_vertices(s->head, subject);
 }
 
-static bool next(side *s, vg_frame *f)
+static bool next_frame(side *s, vg_frame *f)
 {
     bool more = cli_next(s->source, f);
     s->frames += more;
@@ -253,10 +252,10 @@ static bool next_batch(batch *b, side *truth, side *result)
     bool more[2] = {true, true};
     for (b->n = 0; b->n < b->most; b->n++) {
         vg_frame *t = &b->truth[b->n], *r = &b->result[b->n];
-        more[0] = next(truth, t);
-        more[1] = next(result, r);
-        while (more[0] && !more[1]) more[0] = next(truth, t);
-        while (more[1] && !more[0]) more[1] = next(result, r);
+        more[0] = next_frame(truth, t);
+        more[1] = next_frame(result, r);
+        while (more[0] && !more[1]) more[0] = next_frame(truth, t);
+        while (more[1] && !more[0]) more[1] = next_frame(result, r);
         if (!more[0]) return false;
         if (strcmp(t->name, r->name))
             cli_note("frame %zu is '%s' in '%s' and '%s' in '%s'", truth->frames - 1, t->name, truth->name, r->name,
@@ -316,7 +315,7 @@ static void compare(side *truth, side *result, findings *found, report *r)
     cli_redirect(report_file, false);
 }
 
-/* --surface: frame by frame, for a frame has a search tree of its own. */
+/* --surface: frame by frame, because each frame has its own search tree. */
 static void compare_surfaces(surfaces *s, side *truth, side *result, report *r)
 {
     batch b = {0};
@@ -389,7 +388,8 @@ static void report_vertices(report *r, const findings *found)
     report_error(r, "p95", m->p95, m->diagonal, "", nowhere);
     report_error(r, "max", m->max, m->diagonal, at_max, m->max > 0 ? worst : nowhere);
     report_error(r, "sigma", m->sigma, m->diagonal, at_sigma, m->sigma > 0 ? unsteady : nowhere);
-    report_note(r, "From each vertex to where the truth has it, over all vertices and frames. p95: 95 %% of them are nearer.");
+    report_note(r, "Distance of each vertex from its true position, over all vertices and frames. p95: 95 %% of them "
+                   "are smaller.");
     report_note(r, "sigma: the largest standard deviation over the frames of the error of one vertex.");
     report_note(r, "D: the diagonal of the box around the reference pose of the truth.");
 }
@@ -414,7 +414,8 @@ static void report_faces(report *r, const vg_measure_stats *m)
     report_table(r, "face_error", any ? "" : NULL, true, face_columns, COLUMNS_FACE);
     report_row(r, rows[0]);
     report_row(r, rows[1]);
-    if (any) report_note(r, "orientation: 1 - cosine between the normals. area: how far the ratio of the areas is from 1.");
+    if (any) report_note(r, "orientation: 1 - cosine between the normals. area: the difference of the ratio of the "
+                            "areas from 1.");
     any = m->planarity_faces[0] || m->planarity_faces[1];
     if (any) report_gap(r);
     report_table(r, "planarity", any ? "" : NULL, true, planarity_columns, COLUMNS_PLANARITY);
@@ -428,7 +429,7 @@ static void report_faces(report *r, const vg_measure_stats *m)
 }
 
 /* Does the result satisfy? When a tolerance was given the report says so, and `line` is the answer in words. */
-static bool judge(report *r, const double found[4], double diagonal, char *line, size_t size)
+static bool judge_error(report *r, const double found[4], double diagonal, char *line, size_t size)
 {
     if (opts.tolerance < 0) return true;
     const char *of_unit = opts.unit ? opts.unit : "m";
@@ -467,17 +468,17 @@ static void parse_options(int argc, char **argv, char ***operands)
     if (opts.unit && !unit_metres(opts.unit, strlen(opts.unit)))
         cli_usage("option '--unit' needs one of " UNITS_LIST ", not '%s'", opts.unit);
     if (opts.unit && !opts.metres) cli_usage("--unit is for a tolerance with a unit, such as 0.1mm");
-    if (!opts.heat && cli.no_provenance) cli_usage("--no-provenance is about the stream that --heat writes");
+    if (!opts.heat && cli.no_provenance) cli_usage("--no-provenance applies to the stream that --heat writes");
     if (!opts.heat) return;
     if (replaces_report() && (cli.json || opts.frames))
-        cli_usage("option '--%s' is about the report, which needs a file: -o FILE", cli.json ? "json" : "frames");
+        cli_usage("option '--%s' applies to the report, which needs a file: -o FILE", cli.json ? "json" : "frames");
     if (report_file && cli_same_output(opts.heat, report_file))
         cli_usage("'%s' cannot be both the stream and the report", report_file);
-    cli_redirect(opts.heat, true); /* what is wrong with the name is told now */
+    cli_redirect(opts.heat, true); /* report errors in the name now */
     cli_redirect(report_file, false);
 }
 
-/* With --quiet there is no report but one that was asked for by its name. */
+/* With --quiet there is no report unless it was requested by name. */
 static bool wants_report(void)
 {
     return !replaces_report() && (!cli.quiet || report_file || cli.json);
@@ -548,7 +549,7 @@ int main(int argc, char **argv)
         compare(&truth, &result, &found, frames);
         report_all(r, &truth, &result, &found, errors);
     }
-    bool within = judge(r, errors, opts.surface ? s.diagonal : found.measures.diagonal, line, sizeof line);
+    bool within = judge_error(r, errors, opts.surface ? s.diagonal : found.measures.diagonal, line, sizeof line);
     if (opts.frames) report_gap(r);
     report_join(r, frames);
     if (wants_report()) {

@@ -23,38 +23,40 @@ static struct {
 
 static const cli_option options[] = {
     {"vectors", 0, NULL, "write the vectors of the vector graph instead of vertices", .flag = &opts.vectors},
-    {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them",
+    {"faces", 0, "all|selected", "which faces have vectors: all (default), or about half of them",
      .choice = &opts.faces},
     {"reference", 0, "MESH", "the undeformed pose; default: the first pose", .text = &opts.reference,
      .reads = true},
     {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none",
      .text = &opts.mesh, .reads = true},
-    {"array-axes", 0, "ORDER", "what the axes of positions in an NPZ count: fvx, vxf, ... (frames, vertices, x y z)",
+    {"array-axes", 0, "ORDER", "the order of the axes of positions in an NPZ: fvx, vxf, ... (frames, vertices, x y z)",
      .text = &opts.reading.array_axes},
     {"objects", 0, "parts|frames", "objects of an OBJ are parts of one mesh (default), or each a frame",
      .choice = &opts.objects},
-    {"animation", 0, "NAME", "of several animations of a GLB or glTF the one of this name",
+    {"animation", 0, "NAME", "the animation of a GLB or glTF with this name",
      .text = &opts.reading.animation},
-    {"shapes", 0, NULL, "the morph targets of a GLB or glTF, whatever animations it has", .flag = &opts.reading.shapes},
-    {"weld", 0, "exact|off", "vertices of a GLB or glTF that are always at one place are one (default), or stay apart",
+    {"shapes", 0, NULL, "read the morph targets of a GLB or glTF, not its animations", .flag = &opts.reading.shapes},
+    {"weld", 0, "exact|off", "merge vertices of a GLB or glTF that always coincide (default), or keep them apart",
      .choice = &opts.weld},
-    {"max-bytes", 0, "SIZE", "what an archive or compressed file may unpack to (default: 1G in one file, 64G in all)",
+    {"max-bytes", 0, "SIZE", "limit for unpacking archives and compressed files (default: 1G per file, 64G in all)",
      .text = &opts.most_bytes},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
     {"take", 0, "FRAMES", "write these frames alone, counted from 0: 12, or 3,10-20, or 0-/2 for every other",
      .take = take_parse, .context = &opts.take},
     {"fps", 0, "N", "give the poses times, N a second, from 0; sample animations of a GLB or glTF at them",
      .number = &opts.fps, .least = 1e-6, .most = 1e9},
-    {"axes", 0, "y-up|z-up|FROM:TO", "turn the body: make y (or z) point up where z (or y) did; or 'xz-y:xyz'",
+    {"axes", 0, "y-up|z-up|FROM:TO", "rotate the body: make y (or z) point up where z (or y) did; or 'xz-y:xyz'",
      .take = placing_take_axes, .context = &opts.placing},
     {"scale", 0, "X", "multiply all positions by X", .number = &opts.placing.scale, .least = 1e-12, .most = 1e12},
     {"unit", 0, "FROM:TO", "scale from one unit to another, such as cm:m", .take = placing_take_unit,
      .context = &opts.placing},
-    {"mirror", 0, "x|y|z", "mirror the body in its middle: vertices change places with those on the other side",
+    {"mirror", 0, "x|y|z", "mirror the body in its middle: vertices are exchanged with those on the other side",
      .take = placing_take_mirror, .context = &opts.placing},
-    {"pairs", 0, "auto|FILE", "which these are: found in the reference pose (default), or a file, two vertices a line",
+    {"pairs", 0, "auto|FILE", "the pairs of vertices: found in the reference pose (default), or a file, one pair per "
+                              "line",
      .text = &opts.placing.pairs, .reads = true, .needs = "mirror"},
-    {"origin", 0, "centre|floor|X,Y,Z", "move this place of the reference pose to 0,0,0: its centroid, the floor below it",
+    {"origin", 0, "centre|floor|X,Y,Z", "move this point of the reference pose to 0,0,0: its centroid, the floor "
+                                        "below it",
      .text = &opts.placing.origin},
     {"raw", 0, "f32|f64", "read frames that are numbers alone, x y z of each vertex of --mesh, little-endian",
      .choice = &opts.raw, .needs = "mesh", .excludes = "array-axes|animation|shapes|weld|max-bytes"},
@@ -71,7 +73,7 @@ static const cli_program program = {
     .any_form = true,
     .threaded = true};
 
-/* What was made on another reference pose, or on another choice of faces, is not true of the new one. */
+/* Artefacts made with another reference pose, or another choice of faces, are invalid for the new one. */
 static void set_reference(vg_head *h, const char *operand)
 {
     vg_err e;
@@ -110,10 +112,10 @@ static void select_faces(vg_head *h)
     if (vg_select_faces(&h->body.mesh, &h->selection.faces, &h->selection.n, &e) < 0) cli_die(&e);
     h->selection.chosen = true;
     vg_map_clear(&h->map);
-    cli_note("%zu of %zu faces carry vectors", h->selection.n, h->body.mesh.nf);
+    cli_note("%zu of %zu faces have vectors", h->selection.n, h->body.mesh.nf);
 }
 
-/* The options that change a sequence need vertices: a stream of anything else is passed on as it is. */
+/* The options that change a sequence need vertices; a stream of anything else is passed on unchanged. */
 static void apply_options(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors)
 {
     if (h->kind != VG_VERTICES) {
@@ -169,7 +171,7 @@ static vg_frame *to_vectors(work *w, vg_frame *in)
     return out;
 }
 
-static void encode(void *context, size_t n, vg_frame *in)
+static void encode_batch(void *context, size_t n, vg_frame *in)
 {
     work *w = context;
     for (size_t i = 0; i < n; i++) {
@@ -203,7 +205,7 @@ static void encode_raw(work *w, char **operands, size_t n)
     prepare(w, &h, &f);
     cli_stream_open(&h);
     while (raw_next(&in, &f)) {
-        encode(w, 1, &f);
+        encode_batch(w, 1, &f);
         cli_progress("poses", w->read);
     }
     check_taken(w);
@@ -216,7 +218,7 @@ static void encode_raw(work *w, char **operands, size_t n)
 int main(int argc, char **argv)
 {
     static const step encoding = {
-        .batch = 1, .unit = "poses", .init = prepare, .process = encode, .finish = check_taken};
+        .batch = 1, .unit = "poses", .init = prepare, .process = encode_batch, .finish = check_taken};
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     work w = {0};

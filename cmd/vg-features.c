@@ -12,14 +12,14 @@ static struct {
 } opts;
 
 static const cli_option options[] = {
-    {"nine", 0, NULL, "nine numbers a vertex, as printed, and not twelve: the way back is not exact", .flag = &opts.nine},
+    {"nine", 0, NULL, "nine numbers per vertex, as published, not twelve: the reconstruction is not exact", .flag = &opts.nine},
     {"plain", 0, NULL, "leave the rotation of the root in the features, and write none", .flag = &opts.plain},
     {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-features",
     .synopsis = "[options] [FILE]",
-    .summary = "measure poses as features: rotation and stretch of each vertex' neighbourhood",
+    .summary = "compute features of poses: rotation and stretch around each vertex",
     .options = options,
     .most_operands = 1,
     .writes_stream = true,
@@ -115,20 +115,20 @@ static void measure_batch(void *context, size_t n, vg_frame *in)
     free(poses);
 }
 
-static void report(void *context)
+static void report_features(void *context)
 {
     work *w = context;
     w->stats = vg_featurer_get_stats(w->featurer);
-    cli_note("%llu poses of %zu numbers a vertex, %zu components", (unsigned long long)w->stats.poses, w->stats.width,
+    cli_note("%llu poses with %zu numbers per vertex, %zu components", (unsigned long long)w->stats.poses, w->stats.width,
              w->stats.parts);
     cli_note("%llu times an edge over which the rotation jumps by more than half a turn",
              (unsigned long long)w->stats.jumps);
     cli_note("%zu vertices whose neighbourhood is degenerate: with its normal it does not span space",
              w->stats.open_rings);
-    cli_note("largest error of the way back: %.1e D", w->diagonal > 0 ? w->worst / w->diagonal : w->worst);
+    cli_note("largest error of the reconstruction: %.1e D", w->diagonal > 0 ? w->worst / w->diagonal : w->worst);
 }
 
-static void clear(work *w)
+static void clear_work(work *w)
 {
     for (size_t i = 0; i < w->most; i++) vg_frame_clear(&w->out[i]);
     free(w->out);
@@ -145,9 +145,9 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_source *s = cli_source(operands, n);
     work w = {.most = 8 * (size_t)cli.threads};
-    const step measure = {.batch = w.most, .unit = "poses", .init = prepare, .process = measure_batch, .finish = report};
+    const step measure = {.batch = w.most, .unit = "poses", .init = prepare, .process = measure_batch, .finish = report_features};
     step_run(&measure, &w, s);
-    clear(&w);
+    clear_work(&w);
     vg_source_close(&s);
     cli_finish(0);
 }

@@ -12,17 +12,17 @@ static struct {
 } opts = {.rig = {.method = RIGGING_METHOD_NOT_GIVEN, .refine = -1, .hold = 0.03}};
 
 static const cli_option options[] = {
-    {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches,
+    {"patches", 0, "FILE", "the patches, from vg-segment; default: those of the input", .text = &opts.patches,
      .reads = true, .excludes = "skeleton|groups|bones"},
     {"skeleton", 0, "FILE", "a skeleton drives the mesh: BVH, a stream of it, or lines of text",
      .text = &opts.rig.skeleton, .reads = true, .excludes = "groups|bones"},
     {"groups", 0, "FILE", "a skeleton drives the mesh: each joint is the mean of some of its vertices",
      .text = &opts.rig.groups, .reads = true, .excludes = "bones"},
-    {"bones", 0, "N", "no skeleton: find N bones that move freely, with their motions, in the poses",
+    {"bones", 0, "N", "no skeleton: find N independent bones and their motions in the poses",
      .integer = &opts.rig.bones, .least = 1, .most = 65536},
-    {"learn", 0, NULL, "with --skeleton: find its motion from the poses, whatever motion it comes with",
+    {"learn", 0, NULL, "with --skeleton: learn its motion from the poses, not from the file",
      .flag = &opts.rig.learn, .needs = "skeleton"},
-    {"root-at", 0, "X,Y,Z", "with --skeleton: where its root is in the reference pose",
+    {"root-at", 0, "X,Y,Z", "with --skeleton: the position of its root in the reference pose",
      .take = rigging_take_root, .context = &opts.rig, .needs = "skeleton"},
     {"method", 0, "envelope|lbs|auto",
      "with bones: vectors and held vertices, linear blend skinning alone, or, vertex by vertex, the mixture that best "
@@ -31,11 +31,11 @@ static const cli_option options[] = {
     {"bones-per-corner", 0, "N", "with bones: how many bones drive a corner, 1 or 2 (default 2)",
      .integer = &opts.rig.bones_per_corner, .least = 1, .most = 2, .needs = "skeleton|groups|bones"},
     {"refine", 0, "RIDGE",
-     "with bones: the ridge with which bones take up what is left (default 0.003; 0: they do not)",
+     "with bones: the ridge of the regression of the residual on the bones (default 0.003; 0: none)",
      .number = &opts.rig.refine, .least = 0, .most = 1e6, .needs = "skeleton|groups|bones"},
     {"holdout", 0, "N", "leave every Nth pose out of the fit, and report the error there", .integer = &opts.rig.holdout,
      .least = 2, .most = 1000000000},
-    {"hold", 0, "SHARE", "of the vertices, those that go where their patch or bones take them (default 0.03)",
+    {"hold", 0, "SHARE", "share of the vertices that follow their patch or bones exactly (default 0.03)",
      .number = &opts.rig.hold, .least = 0, .most = 1},
     {.name = NULL}};
 
@@ -108,14 +108,14 @@ static void judge_batch(void *context, const fitting_batch *b)
     }
 }
 
-static void describe(const fitting_errors *x, double d, const char *what, const char *which)
+static void report_errors(const fitting_errors *x, double d, const char *what, const char *which)
 {
     if (x->poses)
         cli_say("%s, %s: mean error %.3g D, largest %.3g D, %zu poses", which, what, fitting_mean(x) / d, x->most / d,
                 x->poses);
 }
 
-static void report(patch_fit *x)
+static void report_fit(patch_fit *x)
 {
     vg_err e;
     const vg_head *h = x->f->h;
@@ -134,12 +134,12 @@ static void report(patch_fit *x)
     vg_player_free(&x->player);
     for (int left = 0; left < 2; left++) {
         const char *which = left ? "left out" : "fitted";
-        describe(&x->errors[0][left], d, "patch motions given", which);
-        describe(&x->errors[1][left], d, "rotations alone", which);
+        report_errors(&x->errors[0][left], d, "patch motions given", which);
+        report_errors(&x->errors[1][left], d, "rotations alone", which);
     }
 }
 
-static void fit(vg_source *s)
+static void fit_patches(vg_source *s)
 {
     vg_err e;
     vg_head *h = vg_source_head(s);
@@ -164,7 +164,7 @@ static void fit(vg_source *s)
         cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", h->body.patches.n, pieces.n);
     vg_head_put(h, &pieces, "patches");
     vg_head_put(h, &map, "map");
-    report(&x);
+    report_fit(&x);
     fitting_clear(&f);
 }
 
@@ -173,7 +173,7 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_source *s = cli_source(operands, n);
-    fit(s);
+    fit_patches(s);
     cli_stream_open(vg_source_head(s));
     cli_stream_end(vg_source_tail(s));
     vg_source_close(&s);

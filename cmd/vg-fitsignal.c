@@ -42,22 +42,23 @@ static const cli_option options[] = {
      .integer = &opts.l, .least = 1, .most = 1000},
     {"controls", 'k', "K", "how many control points of the curve (default: as few as the tolerance allows)",
      .integer = &opts.k, .least = 4, .most = 1002},
-    {"root", 0, "rigid|none", "the motion of the whole body is a signal of its own (default), or part of the shapes",
+    {"root", 0, "rigid|none", "the motion of the whole body is a separate signal (default), or part of the shapes",
      .choice = &opts.root},
     {"space", 0, "vertices|vectors|gradients|rotations|lengths",
-     "what is added up to shapes: positions (default), turns of corners or of triangles, turns or angles between triangles",
+     "the numbers of a shape: positions (default), rotations of corners or triangles, rotations or angles between "
+     "triangles",
      .choice = &opts.space},
     {"layout", 0, "auto|plain|ring[=C]|time[=C]",
      "how frames are laid out in the plane: by distances alone, with a cycle, with time (default auto)",
      .text = &opts.layout},
-    {"pin", 0, "FRAME=X,Y", "this frame is there in the plane; may be repeated", .take = take_pin,
+    {"pin", 0, "FRAME=X,Y", "put this frame there in the plane; may be repeated", .take = take_pin,
      .excludes = "place"},
-    {"place", 0, "FILE", "where all frames are in the plane: lines of two numbers", .text = &opts.place, .reads = true,
+    {"place", 0, "FILE", "positions of all frames in the plane: lines of two numbers", .text = &opts.place, .reads = true,
      .excludes = "layout"},
     {"sites", 0, "farthest|gain", "sites are frames of the largest error (default), or those that help most",
      .choice = &opts.sites},
-    {"basis", 0, "double|single|int16", "how precisely the basis is kept (default double)", .choice = &opts.basis},
-    {"examples", 0, "POSES", "shapes are sums of what these poses differ by from the first of them",
+    {"basis", 0, "double|single|int16", "precision of the stored basis (default double)", .choice = &opts.basis},
+    {"examples", 0, "POSES", "shapes are sums of the differences of these poses from the first of them",
      .text = &opts.examples, .reads = true, .excludes = "coordinates|space"},
     {"pick", 0, "N", "no fit: name the N frames from which the others are predicted best", .integer = &opts.pick,
      .least = 1, .most = 1000},
@@ -87,7 +88,7 @@ static void parse_layout(vg_signal_options *o)
         cli_usage("option '--layout' needs auto, plain, ring, ring=C, time or time=C, not '%s'", text);
     o->layout = (vg_layout)i;
     if (equals && (cli_parse_numbers(equals + 1, &o->weight, 1) != 1 || !(o->weight > 0 && o->weight <= 1e6)))
-        cli_usage("option '--layout' needs a weight above 0 and up to a million behind '=', not '%s'", equals + 1);
+        cli_usage("option '--layout' needs a weight above 0 and up to a million after '=', not '%s'", equals + 1);
 }
 
 /* ---- the report ---- */
@@ -159,7 +160,7 @@ static void write_report(const vg_signal *s, const vg_signal_stats *r)
     report_free(&t);
 }
 
-static void say(const vg_signal *s, const vg_signal_stats *r)
+static void note_fit(const vg_signal *s, const vg_signal_stats *r)
 {
     cli_note("%zu frames: %zu control points, %zu sites, %zu shape coordinates; largest error %.3g D, rms %.3g D", s->n,
             s->k, s->l, s->m, s->error_time, s->error_rms);
@@ -167,10 +168,10 @@ static void say(const vg_signal *s, const vg_signal_stats *r)
         cli_note("layout %s %g, deviation between frames %.3g of that of straight lines, %zu crossings",
                  layout_name(s->layout), s->layout_weight, s->layout_ratio, r->ncrossings);
     if (!(opts.m || opts.l || opts.k || opts.examples) && s->error_time > opts.tolerance)
-        cli_warn("the tolerance of %g D is not reached: frames that are nearly at one place in the plane differ by up to "
-                 "%.3g D", opts.tolerance, s->error_time);
+        cli_warn("the tolerance of %g D is not reached: frames that are nearly at one point in the plane differ by "
+                 "up to %.3g D", opts.tolerance, s->error_time);
     if (s->layout_ratio > 2)
-        cli_warn("between frames the signal goes %.1f times as far astray as straight lines: try another --layout, or "
+        cli_warn("between frames the signal deviates %.1f times as much as straight lines: try another --layout, or "
                  "--pin", s->layout_ratio);
 }
 
@@ -190,7 +191,7 @@ static char *list_frames(const uint32_t *frame, size_t n)
 }
 
 /* Frames count from 0 here, as vg-encode --take and vg-diff --frames count them. */
-static void pick(const vg_head *h, poses *p)
+static void pick_frames(const vg_head *h, poses *p)
 {
     vg_err e;
     uint32_t *frame;
@@ -232,7 +233,7 @@ int main(int argc, char **argv)
     vg_head *h = vg_source_head(source);
     cli_need_vertices(h, "the input");
     poses p = poses_read(source, VG_SIGNAL_FRAMES);
-    if (opts.pick) pick(h, &p);
+    if (opts.pick) pick_frames(h, &p);
     if (opts.place) o.place = read_places(opts.place, p.n), o.layout = VG_LAYOUT_PLACED;
     poses x = {0};
     if (opts.examples) x = poses_load(opts.examples, VG_SIGNAL_FRAMES, &h->body.mesh, h);
@@ -246,7 +247,7 @@ int main(int argc, char **argv)
     poses_name(&p, &h->signal);
     poses_clear(&x);
     vg_graph_free(&graph);
-    say(&h->signal, &r);
+    note_fit(&h->signal, &r);
     cli_stream_open(h);
     cli_stream_end(vg_source_tail(source));
     if (opts.report) write_report(&h->signal, &r);

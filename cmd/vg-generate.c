@@ -20,26 +20,26 @@ static void take_merge(const char *text, void *context)
     opts.merge = strtod(text, &end);
     if (*end == '%' && !end[1]) opts.merge /= 100, end++;
     if (*end || end == text || !(opts.merge > 0 && opts.merge <= 1))
-        cli_usage("option '--merge' needs a share of the training's range such as 5%%, not '%s'", text);
+        cli_usage("option '--merge' needs a share of the training range such as 5%%, not '%s'", text);
 }
 
 static const cli_option options[] = {
     {"frames", 0, "N", "how many poses to add (default 30)", .integer = &opts.frames, .least = 1, .most = 1000000000,
      .excludes = "between"},
-    {"given", 0, "N", "go on from the first N poses that come in; leave out the others (default: from all)",
+    {"given", 0, "N", "continue from the first N input poses; ignore the others (default: from all)",
      .integer = &opts.given, .least = 1, .most = 1000000000, .excludes = "between"},
     {"between", 0, "N", "the input poses are keys: put N poses between each and the next", .integer = &opts.between,
      .least = 1, .most = 1000000},
-    {"loop", 0, NULL, "make a cycle: lead back to the first pose at the end", .flag = &opts.loop},
-    {"optimise", 0, NULL, "look for the way that ends nearest to the key", .flag = &opts.optimise, .needs = "between|loop",
+    {"loop", 0, NULL, "make a cycle: return to the first pose at the end", .flag = &opts.loop},
+    {"optimise", 0, NULL, "optimise the run to end nearest to the key", .flag = &opts.optimise, .needs = "between|loop",
      .excludes = "merge"},
-    {"merge", 0, "SHARE", "try random ways from both keys until they are so near, as 5% of the range", .take = take_merge,
+    {"merge", 0, "SHARE", "try random runs from both keys until they are that near, such as 5% of the range", .take = take_merge,
      .needs = "between|loop"},
-    {"diversity", 0, "X", "begin from random states of this deviation (with --seed 0.3, else 0: always the same)",
+    {"diversity", 0, "X", "start from random states of this deviation (with --seed 0.3, else 0: always the same)",
      .number = &opts.diversity, .least = 0, .most = 100},
-    {"seed", 0, "N", "another choice of random states (default 1)", .integer = &opts.seed, .least = 0,
+    {"seed", 0, "N", "seed of the random states (default 1)", .integer = &opts.seed, .least = 0,
      .most = 4294967295.0},
-    {"root", 0, "move|stay", "the body as a whole moves on as it learned to (default), or stays", .choice = &opts.root},
+    {"root", 0, "move|stay", "the body moves as in the training (default), or stays", .choice = &opts.root},
     {.name = NULL}};
 
 static const cli_program program = {
@@ -62,7 +62,7 @@ static vg_generator *make_generator(const vg_network *n, const vg_head *h)
     return g;
 }
 
-static void put(vg_frame *f, uint64_t number)
+static void put_frame(vg_frame *f, uint64_t number)
 {
     char name[40];
     vg_err e;
@@ -103,23 +103,23 @@ static void say_way(const vg_way *way, const char *to)
 {
     double miss = 100 * way->miss;
     if (opts.merge > 0 && !way->merged)
-        cli_warn("on the way to %s: of %zu pairs of ways none came within %.3g %% of the range, the nearest within %.3g %%: they "
-                 "are joined there", to, way->tries, 100 * opts.merge, miss);
-    else if (opts.merge > 0) cli_note("to %s: the ways from both keys came within %.3g %% of the range, pair %zu", to, miss, way->tries);
+        cli_warn("on the way to %s: none of %zu pairs of runs came within %.3g %% of the range, the nearest within "
+                 "%.3g %%: they are joined there", to, way->tries, 100 * opts.merge, miss);
+    else if (opts.merge > 0) cli_note("to %s: the runs from both keys came within %.3g %% of the range, pair %zu", to, miss, way->tries);
     else if (opts.optimise)
-        cli_note("to %s: after %zu rounds of search the way %s missed it by %.3g %% of the range", to, way->tries,
+        cli_note("to %s: after %zu rounds of optimisation the run %s missed it by %.3g %% of the range", to, way->tries,
                  way->backward ? "from there back" : "there", miss);
-    else cli_note("to %s: the way %s missed it by %.3g %% of the range", to, way->backward ? "from there back" : "there", miss);
+    else cli_note("to %s: the run %s missed it by %.3g %% of the range", to, way->backward ? "from there back" : "there", miss);
 }
 
-static void cross(gap *w, vg_generator *g, const double *key, bool loop, const char *to)
+static void cross_gap(gap *w, vg_generator *g, const double *key, bool loop, const char *to)
 {
     vg_err e;
     vg_way way;
     cli_working("looking for a way");
     if (vg_generator_between(g, key, loop, w->n, w->poses, &way, &e) < 0) cli_die(&e);
     say_way(&way, to);
-    for (size_t i = 0; i < w->n; i++) put(&w->frame[i], ++w->number);
+    for (size_t i = 0; i < w->n; i++) put_frame(&w->frame[i], ++w->number);
 }
 
 static double *copy_pose(const double *pose, const vg_head *h)
@@ -141,7 +141,7 @@ static void lead(vg_generator *g, vg_source *s)
     while (cli_next(s, &key)) {
         char name[40];
         snprintf(name, sizeof name, "key %llu", (unsigned long long)++keys);
-        if (keys > 1) cross(&w, g, key.values, false, name);
+        if (keys > 1) cross_gap(&w, g, key.values, false, name);
         else if (vg_generator_give(g, key.values, &e) < 0) cli_die(&e);
         if (opts.loop && !first) first = copy_pose(key.values, vg_source_head(s));
         w.number++;
@@ -149,8 +149,8 @@ static void lead(vg_generator *g, vg_source *s)
     }
     if (keys < 2 && !opts.loop)
         cli_stop(VG_EINPUT, "--between needs at least two keys, the input has %llu", (unsigned long long)keys);
-    if (!keys) cli_stop(VG_EINPUT, "the input has no pose to begin from");
-    if (opts.loop) cross(&w, g, first, true, "the first pose");
+    if (!keys) cli_stop(VG_EINPUT, "the input has no pose to start from");
+    if (opts.loop) cross_gap(&w, g, first, true, "the first pose");
     free(first);
     free_gap(&w);
     vg_frame_clear(&key);
@@ -161,10 +161,10 @@ static void lead(vg_generator *g, vg_source *s)
 static void warn_of_motion(const vg_generator *g)
 {
     double change = vg_generator_change(g), drift = vg_generator_drift(g);
-    if (change < 0.5) cli_warn("the motion freezes: at the end it is %.2f times as lively as what was learned", change);
-    if (change > 2) cli_warn("the motion runs away: at the end it is %.2f times as lively as what was learned", change);
+    if (change < 0.5) cli_warn("the motion freezes: at the end it changes %.2f times as much as the training data", change);
+    if (change > 2) cli_warn("the motion diverges: at the end it changes %.2f times as much as the training data", change);
     if (drift > 0.1)
-        cli_warn("the poses drift: at the end they are %.0f %% of the range of what was learned outside of it", 100 * drift);
+        cli_warn("the poses drift: at the end they are outside the training range by %.0f %% of it", 100 * drift);
 }
 
 /* The poses that are given go out, too, each before the next is read; then those that go on, each before the next is
@@ -181,7 +181,7 @@ static void go_on(vg_generator *g, vg_source *s)
         given++;
         cli_stream_put(&f);
     }
-    if (!given) cli_stop(VG_EINPUT, "the input has no pose to go on from");
+    if (!given) cli_stop(VG_EINPUT, "the input has no pose to continue from");
     if (opts.given && given < most)
         cli_stop(VG_EINPUT, "--given %ld needs as many poses, the input has %llu", opts.given, (unsigned long long)given);
     vg_frame_clear(&f);
@@ -189,13 +189,13 @@ static void go_on(vg_generator *g, vg_source *s)
         gap w;
         make_gap(&w, (size_t)opts.frames, vg_source_head(s));
         w.number = given;
-        cross(&w, g, first, true, "the first pose");
+        cross_gap(&w, g, first, true, "the first pose");
         free_gap(&w);
     } else {
         if (vg_frame_shape(&f, vg_source_head(s), &e) < 0) cli_die(&e);
         for (uint64_t i = 0; i < (uint64_t)opts.frames; i++) {
             if (vg_generator_next(g, f.values, &e) < 0) cli_die(&e);
-            put(&f, given + i + 1);
+            put_frame(&f, given + i + 1);
         }
         warn_of_motion(g);
         vg_frame_clear(&f);
@@ -212,7 +212,7 @@ int main(int argc, char **argv)
     vg_err e;
     vg_head from = {0};
     size_t n = cli_start(&program, argc, argv, &operands);
-    if (!n) cli_usage("a network is needed: what vg-train wrote");
+    if (!n) cli_usage("a network from vg-train is needed");
     cli_load(&from, operands[0], "network");
     vg_source *s = cli_source(operands + 1, n - 1);
     vg_head *h = vg_source_head(s);

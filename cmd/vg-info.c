@@ -1,6 +1,5 @@
-/* vg-info.c: say what is in a sequence, whether it is whole, and who made it.
- * Leaves out what reading the frames tells (contents.c) and the reports on parts of the head that have their own file;
- * it changes nothing: it writes text.
+/* vg-info.c: describes a sequence, checks that it is complete, and shows how it was made. Frames are read in
+ * contents.c; reports on some parts of the head are in separate files.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "contents.h"
@@ -19,18 +18,19 @@ static struct {
 } opts;
 
 static const cli_option options[] = {
-    {.name = "check", .help = "read everything and only say whether it is whole", .flag = &opts.check,
+    {.name = "check", .help = "read everything and only check that it is complete", .flag = &opts.check,
      .excludes = "digest|frames|weights|positions|curve|vertices"},
     {.name = "digest", .help = "only print a fingerprint of the content: 16 hexadecimal digits",
      .flag = &opts.digest, .excludes = "frames|weights|positions|curve"},
     {.name = "frames", .help = "list the frames", .flag = &opts.frames, .excludes = "weights|positions|curve"},
     {.name = "weights", .help = "only print the skinning weights of a rig, a vertex per line", .flag = &opts.weights,
      .excludes = "json|positions|curve"},
-    {.name = "vertices", .help = "only print which vertex each vertex of a GLB or glTF is, after welding", .flag = &opts.vertices,
+    {.name = "vertices", .help = "only print the vertex that each vertex of a GLB or glTF becomes by welding", .flag = &opts.vertices,
      .excludes = "json|digest|frames|weights|positions|curve"},
-    {.name = "positions", .help = "only print where control points and frames of a signal are, for vg-sample --edit",
+    {.name = "positions", .help = "only print the positions of control points and frames of a signal, for vg-sample "
+                                  "--edit",
      .flag = &opts.positions, .excludes = "json|curve"},
-    {"curve", 0, NULL, "only print the curve of a signal: points for vg-sample --curve, their times, where it crosses itself",
+    {"curve", 0, NULL, "only print the curve of a signal: points for vg-sample --curve, their times, crossings",
      .flag = &opts.curve, .excludes = "json"},
     {0},
 };
@@ -38,7 +38,7 @@ static const cli_option options[] = {
 static const cli_program program = {
     .name = "vg-info",
     .synopsis = "[options] [FILE]",
-    .summary = "say what is in a sequence, whether it is whole, and who made it",
+    .summary = "describe a sequence, check that it is complete, and show how it was made",
     .options = options,
     .most_operands = 1,
     .writes_text = true,
@@ -68,7 +68,7 @@ static void report_map(report *r, const vg_map *m)
     report_put(r, "hinges", bones ? NULL : "hinges", report_count(m->nhinges));
     report_put(r, "held_vertices", "held", report_count(m->nheld));
     report_put(r, "retargeted", NULL, report_flag(m->has_home));
-    if (m->has_home) report_put(r, NULL, "body", report_text("another one than its poses are measured on"));
+    if (m->has_home) report_put(r, NULL, "body", report_text("not the one on which poses are measured"));
     report_end(r);
 }
 
@@ -115,8 +115,8 @@ typedef struct step {
     size_t process, depth;
 } step;
 
-/* The last process first, and below each what it read from. Every process is shown once, so that the tree is never
- * longer than the list. */
+/* The last process first, and below each the processes whose output it read. Every process is shown once, so that the
+ * tree is never longer than the list. */
 static void note_tree(report *r, const vg_head *h)
 {
     size_t n = h->nprovenance, nedges = n;
@@ -169,7 +169,7 @@ static void report_unknown(report *r, const vg_head *h, const contents *c)
     }
     if (h->extra.n + c->extra == 0) return;
     report_gap(r);
-    report_note(r, "records this version does not know: %zu before the frames, %" PRIu64 " between and behind them",
+    report_note(r, "records unknown to this version: %zu before the frames, %" PRIu64 " between and after them",
                 h->extra.n, c->extra);
 }
 

@@ -1,5 +1,5 @@
-/* vg-interpolate: poses between key poses and beyond them, as vectors.
- * Leaves out the mathematics (lib/method/vectors/interpolate.c), and paths of transforms, which need a map (vg-play).
+/* vg-interpolate: interpolates and extrapolates key poses, as vectors. The mathematics is in
+ * lib/method/vectors/interpolate.c; paths of transforms need a map (vg-play).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
 #include "pose_times.h"
@@ -16,7 +16,7 @@ static struct {
 static const cli_option options[] = {
     {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
      .take = pose_times_take, .context = &opts.times, .excludes = "speed"},
-    {"speed", 0, "X", "play at this speed, as many frames a second as before: 0.5 is slow motion, with twice as many",
+    {"speed", 0, "X", "play at this speed with the same frame rate: 0.5 is slow motion with twice as many frames",
      .number = &opts.times.speed, .least = 1e-4, .most = 1e4},
     {"smooth", 0, NULL, "keep the velocity continuous at the poses that are interpolated", .flag = &opts.smooth},
     {.name = NULL}};
@@ -24,7 +24,7 @@ static const cli_option options[] = {
 static const cli_program program = {
     .name = "vg-interpolate",
     .synopsis = "[options] N | --at T,... | --speed X [FILE]",
-    .summary = "write N poses, evenly spaced from the first pose of the input to the last, or poses at given moments",
+    .summary = "interpolate and extrapolate key poses: N evenly spaced poses, or poses at given moments",
     .options = options,
     .most_operands = 2,
     .writes_stream = true,
@@ -35,11 +35,11 @@ static const cli_program program = {
 static size_t take_count(char **operands, size_t n)
 {
     if (opts.times.at) {
-        if (n > 1) cli_usage("--at says which poses are written, so '%s' is one operand too many", operands[0]);
+        if (n > 1) cli_usage("--at defines which poses are written, so '%s' is one operand too many", operands[0]);
         return 0;
     }
     if (opts.times.speed > 0) {
-        if (n > 1) cli_usage("--speed says how many poses are written, so '%s' is one operand too many", operands[0]);
+        if (n > 1) cli_usage("--speed defines how many poses are written, so '%s' is one operand too many", operands[0]);
         return 0;
     }
     if (n == 0) cli_usage("say how many poses to write: vg-interpolate 30, or which: vg-interpolate --at 0,0.5,1");
@@ -80,7 +80,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     p->h->count = vg_graph_corners(p->g);
 }
 
-static void keep(poses *p, const vg_frame *f)
+static void keep_pose(poses *p, const vg_frame *f)
 {
     const vg_head *h = p->h;
     double *values = cli_allocate(p->numbers, sizeof *values, "the key poses"),
@@ -114,10 +114,10 @@ static void place_keys(poses *p)
 
 static void keep_batch(void *context, size_t n, vg_frame *in)
 {
-    for (size_t i = 0; i < n; i++) keep(context, &in[i]);
+    for (size_t i = 0; i < n; i++) keep_pose(context, &in[i]);
 }
 
-static void clear(poses *p)
+static void clear_poses(poses *p)
 {
     for (size_t i = 0; i < p->n; i++) {
         free((double *)(uintptr_t)p->keys[i].values);
@@ -184,13 +184,13 @@ static void write_poses(const poses *p, vg_path *path)
     vg_frame_clear(&f);
 }
 
-static void report(const vg_path *path)
+static void report_path(const vg_path *path)
 {
     vg_path_stats stats = vg_path_get_stats(path);
     const vg_deform_stats *c = &stats.degenerate;
-    cli_note("%zu stretches between keys, %zu with turns by more than half a turn", stats.segments, stats.beyond);
+    cli_note("%zu segments between keys, %zu with rotations by more than half a turn", stats.segments, stats.beyond);
     if (c->corners)
-        cli_warn("%llu corners without a direction took the turn of their face (the first in face %llu)",
+        cli_warn("%llu corners without a direction took the rotation of their face (the first in face %llu)",
                  (unsigned long long)c->corners, (unsigned long long)c->first_face);
 }
 
@@ -200,13 +200,13 @@ static void interpolate(void *context)
     vg_path *path;
     vg_err e;
     if (p->n < 2)
-        cli_stop(VG_EINPUT, "there is %s in the input, and a path needs two or more", p->n ? "one pose" : "no pose");
+        cli_stop(VG_EINPUT, "there is %s in the input, but a path needs at least two", p->n ? "one pose" : "no pose");
     place_keys(p);
     const vg_path_options o = {.kind = p->kind, .nanchors = p->h->nanchors, .smooth = opts.smooth,
                                .threads = cli.threads};
     if (vg_path_new(&path, p->g, p->h->body.reference, p->keys, p->n, &o, &e) < 0) cli_die(&e);
     write_poses(p, path);
-    report(path);
+    report_path(path);
     vg_path_free(&path);
 }
 
@@ -218,6 +218,6 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands), count = take_count(operands, n);
     poses p = {0};
     step_run(&between, &p, cli_source(operands + count, n - count));
-    clear(&p);
+    clear_poses(&p);
     cli_finish(0);
 }

@@ -38,7 +38,7 @@ static key *add_key(int by, const char *option, const char *mesh)
 static void add_end(const char *mesh, int by, const char *option)
 {
     for (size_t i = 0; i < opts.nkeys; i++)
-        if ((int)opts.keys[i].by == by) cli_usage("option '%s' is there twice", option);
+        if ((int)opts.keys[i].by == by) cli_usage("option '%s' is given twice", option);
     add_key(by, option + 2, mesh)->option = option;
 }
 
@@ -92,17 +92,18 @@ static const cli_option options[] = {
     {"key", 0, "FRAME=MESH", "this frame, by name or by number from 0, becomes this pose; repeat as needed",
      .take = take_key},
     {"over", 0, "time|pose",
-     "how keys share the frames between them: linearly in time (default for one or two), or by how much the pose is "
-     "like theirs",
+     "weights of the keys for the frames between them: linear in time (default for one or two), or by similarity of "
+     "the pose",
      .choice = &opts.over},
-    {"memory", 0, "SIZE", "hold this much of waiting frames in memory, the rest in a file (default: 256M)",
+    {"memory", 0, "SIZE", "keep this much of the waiting frames in memory, the rest in a file (default: 256M)",
      .take = take_memory},
     {0}};
 
 static const cli_program program = {
     .name = "vg-poisson",
     .synopsis = "[options] [FILE]",
-    .summary = "guide a sequence in time through given poses: exact there, second differences kept elsewhere",
+    .summary = "guide a sequence in time through given poses: exact there, with unchanged second differences "
+               "elsewhere",
     .options = options,
     .most_operands = 1,
     .writes_stream = true};
@@ -184,7 +185,7 @@ static const double *find_given(work *w, uint64_t n, const char *name, bool last
     return found ? found->pose : NULL;
 }
 
-static void apply(work *w, uint64_t n, double *pose)
+static void apply_keys(work *w, uint64_t n, double *pose)
 {
     if (w->poses) vg_pose_guide_apply(w->poses, n, pose);
     else vg_guide_apply(w->guide, n, pose);
@@ -201,7 +202,7 @@ static void release_held(work *w)
     vg_err e;
     int r;
     while ((r = vg_spool_next(w->spool, &w->held, &e)) > 0) {
-        apply(w, w->released++, w->held.values);
+        apply_keys(w, w->released++, w->held.values);
         cli_stream_put(&w->held);
     }
     if (r < 0) cli_die(&e);
@@ -211,7 +212,7 @@ static void guide(work *w, vg_frame *f, uint64_t n, bool last)
 {
     const double *given = find_given(w, n, f->name, last);
     vg_err e;
-    vg_frame_drop_all(f); /* what came with the vertices is not true of where they go */
+    vg_frame_drop_all(f); /* channels of the vertices are not valid for the new positions */
     if (given) {
         set_key(w, n, f->values, given);
         w->begun = true;
@@ -222,7 +223,7 @@ static void guide(work *w, vg_frame *f, uint64_t n, bool last)
         return;
     }
     if (given) release_held(w);
-    if (!given || w->poses) apply(w, n, f->values);
+    if (!given || w->poses) apply_keys(w, n, f->values);
     w->released = n + 1;
     cli_stream_put(f);
 }

@@ -1,5 +1,5 @@
-/* vg-register: pair the faces of two meshes of different connectivity, from a few pairs of vertices.
- * Leaves out what is done with the pairs: 'vg-deform --correspondence'.
+/* vg-register: pairs the faces of two meshes of different connectivity, from a few pairs of vertices. 'vg-deform
+ * --correspondence' uses the result.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 
@@ -27,7 +27,7 @@ static const cli_option options[] = {
     {.name = "markers",
      .letter = 'm',
      .value = "FILE",
-     .help = "pairs of vertices, one a line: [NAME] SOURCE TARGET",
+     .help = "pairs of vertices, one per line: [NAME] SOURCE TARGET",
      .text = &opts.markers,
      .reads = true},
     {.name = "index-base",
@@ -37,25 +37,25 @@ static const cli_option options[] = {
      .least = 0,
      .most = 1,
      .needs = "markers|dense|dense-source"},
-    {.name = "keep-all", .help = "use also markers that contradict the others", .flag = &opts.keep_all,
+    {.name = "keep-all", .help = "also use markers that contradict the others", .flag = &opts.keep_all,
      .needs = "markers"},
     {.name = "dense",
      .value = "FILE",
-     .help = "vertices of TARGET as points of SOURCE, one a line: VERTEX A B C WA WB WC",
+     .help = "vertices of TARGET as points of SOURCE, one per line: VERTEX A B C WA WB WC",
      .text = &opts.dense,
      .reads = true,
      .excludes = "dense-source"},
     {.name = "dense-source",
      .value = "FILE",
-     .help = "the same the other way round: vertices of SOURCE as points of TARGET",
+     .help = "the reverse: vertices of SOURCE as points of TARGET",
      .text = &opts.dense_source,
      .reads = true},
-    {.name = "uv", .help = "points of the same texture coordinates belong together", .flag = &opts.uv},
+    {.name = "uv", .help = "pair points with the same texture coordinates", .flag = &opts.uv},
     {.name = "aligned",
-     .help = "the two lie on one another as they are; markers are not needed",
+     .help = "the meshes are already aligned; markers are not needed",
      .flag = &opts.aligned},
     {.name = "bind",
-     .help = "TARGET rides on SOURCE as they are, as a shirt, hair or a prop; nothing is fitted",
+     .help = "bind TARGET, such as a shirt, hair or a prop, to SOURCE as they are; nothing is fitted",
      .flag = &opts.bind,
      .excludes = "markers|dense|dense-source|uv|aligned|components"},
     {.name = "components",
@@ -79,8 +79,8 @@ static void check_options(size_t operands)
 {
     if (operands != 2) cli_usage("two meshes are needed: SOURCE and TARGET");
     if (!opts.markers && !opts.dense && !opts.dense_source && !opts.uv && !opts.aligned && !opts.bind)
-        cli_usage("nothing says which point belongs to which: give --markers FILE, --dense FILE, --uv, or --aligned "
-                  "when the meshes lie on one another; --bind for clothes and props");
+        cli_usage("there are no pairs of points: give --markers FILE, --dense FILE, --uv, or --aligned if the meshes "
+                  "are aligned; --bind for clothes and props");
 }
 
 /* ---- what is said on standard error ---- */
@@ -114,7 +114,7 @@ static void report_markers(const vg_markers *m, const vg_register_result *r)
             cli_warn("%s, vertex %ld on vertex %ld, is %.3g D from where its neighbours expect it, most are within "
                      "%.2g D: %s",
                      which, m->at[i].source + opts.base, m->at[i].target + opts.base, r->residual[i],
-                     2 * r->typical_residual, opts.keep_all ? "it is used all the same" : "it is left out");
+                     2 * r->typical_residual, opts.keep_all ? "it is used anyway" : "it is left out");
         else
             cli_note("%s: %.3g D from where its neighbours expect it", which, r->residual[i]);
     }
@@ -131,7 +131,7 @@ static void report_components(const vg_register_result *r)
         if (n++ < LISTED) at += (size_t)snprintf(list + at, sizeof list - at, at ? ", %zu" : "%zu", k);
     }
     if (!n || opts.ncomponents) return;
-    cli_warn("%zu of the %zu components of the source explain nothing of the target and are left out: %s%s", n,
+    cli_warn("%zu of the %zu components of the source match no part of the target and are left out: %s%s", n,
              r->components, list, n > LISTED ? ", ..." : "");
 }
 
@@ -161,7 +161,7 @@ static void warn_shared(const vg_markers *m, bool target)
         if (at[i].vertex == at[i - 1].vertex && told++ < MOST_WARNINGS)
             cli_warn("the markers of lines %zu and %zu are both on vertex %ld of the %s", at[i - 1].by->line,
                      at[i].by->line, at[i].vertex + opts.base, target ? "target" : "source");
-    if (told > MOST_WARNINGS) cli_warn("so it is with %zu more markers", told - MOST_WARNINGS);
+    if (told > MOST_WARNINGS) cli_warn("the same applies to %zu more markers", told - MOST_WARNINGS);
     free(at);
 }
 
@@ -182,7 +182,7 @@ static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
     for (size_t k = 0; k < n; k++) {
         if (!without[k]) continue;
         if (told++ < MOST_WARNINGS)
-            cli_warn("%zu of the %zu faces of the target's component %zu have no counterpart: they ride with %s",
+            cli_warn("%zu of the %zu faces of the target's component %zu have no counterpart: they follow %s",
                      without[k], faces[k], k,
                      without[k] < faces[k] ? "those beside them" : "the nearest faces that have one");
     }
@@ -216,7 +216,7 @@ static void read_pairs(vg_register_input *in, vg_markers *markers, vg_seed **see
     }
 }
 
-static void load(vg_head *h, const char *operand)
+static void load_mesh(vg_head *h, const char *operand)
 {
     cli_load(h, operand, "mesh");
     if (opts.uv && h->body.attributes.ntex == 0)
@@ -251,7 +251,7 @@ static void bind_target(vg_head *source, vg_head *target)
     if (vg_bind(&c, &s->mesh, s->reference, &t->mesh, t->reference, cli.threads, &e) < 0) cli_die(&e);
     double farthest = 0, D = vg_diagonal(s->reference, s->mesh.nv);
     for (size_t f = 0; f < c.target_nf; f++) farthest = c.distance[f] > farthest ? c.distance[f] : farthest;
-    cli_note("%zu faces ride on the source, the farthest %.3g %% of D from it", c.target_nf, 100 * farthest / D);
+    cli_note("%zu faces are bound to the source, the farthest at %.3g %% of D from it", c.target_nf, 100 * farthest / D);
     write_stream(source, target, &c, s->reference);
 }
 
@@ -293,8 +293,8 @@ int main(int argc, char **argv)
     char **operands;
     vg_head source = {0}, target = {0};
     check_options(cli_start(&program, argc, argv, &operands));
-    load(&source, operands[0]);
-    load(&target, operands[1]);
+    load_mesh(&source, operands[0]);
+    load_mesh(&target, operands[1]);
     if (opts.bind) bind_target(&source, &target);
     else pair_meshes(&source, &target);
     free(opts.components);

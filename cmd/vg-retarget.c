@@ -11,15 +11,15 @@ static struct {
 } opts = {.morph = 1};
 
 static const cli_option options[] = {
-    {"onto", 0, "MESH", "the body, which has the same faces as the map's and stands as its reference pose does",
+    {"onto", 0, "MESH", "the new body, with the faces of the map's body and in its reference pose",
      .text = &opts.onto, .reads = true},
-    {"morph", 0, "T", "how far to go on the way to that body (default 1)", .number = &opts.morph},
+    {"morph", 0, "T", "position between the map's body (0) and the new one (1, the default)", .number = &opts.morph},
     {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-retarget",
     .synopsis = "[options] --onto MESH [MAP]",
-    .summary = "bring a map, made by vg-fitmap, to another body of the same faces",
+    .summary = "transfer a map to another body of the same connectivity",
     .options = options,
     .most_operands = 1,
     .writes_stream = true,
@@ -54,7 +54,7 @@ int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
-    if (!opts.onto) cli_usage("name the body that the map is brought to: --onto MESH");
+    if (!opts.onto) cli_usage("name the new body: --onto MESH");
     vg_source *s = cli_source(operands, n);
     retarget(vg_source_head(s));
     vg_frame frame = {0};

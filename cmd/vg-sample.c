@@ -23,20 +23,20 @@ static const cli_option options[] = {
      .most = 1e6, .excludes = "speed|curve"},
     {"speed", 0, "X", "X times as fast: below 1 there are frames in between", .number = &opts.speed, .least = 1e-6,
      .most = 1e6, .excludes = "curve"},
-    {"retime", 0, "FILE", "lines of an old and a new time: slow here, fast there", .text = &opts.retime, .reads = true,
+    {"retime", 0, "FILE", "lines of an old and a new time, for varying speed", .text = &opts.retime, .reads = true,
      .excludes = "curve"},
     {"edit", 0, "FILE", "change the signal by these lines first: control, insert, remove, frame, site, time",
      .text = &opts.edit, .reads = true},
     {"curve", 0, "FILE", "poses along this curve through the plane: lines 'X Y' it goes through, or 'control X Y'",
      .text = &opts.curve, .reads = true},
-    {"onto", 0, "POSES", "on another body: its poses take the place of those of vg-fitsignal --examples",
+    {"onto", 0, "POSES", "another body: its poses replace those of vg-fitsignal --examples",
      .text = &opts.onto, .reads = true},
     {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-sample",
     .synopsis = "[options] [FILE]",
-    .summary = "give the poses of a signal that vg-fitsignal has made, at any times",
+    .summary = "sample the poses of a signal at any times",
     .options = options,
     .most_operands = 1,
     .writes_stream = true};
@@ -51,7 +51,7 @@ typedef struct plan {
 
 static void add_time(plan *p, size_t *cap, double time)
 {
-    if (p->n == MOST_FRAMES) cli_stop(VG_EARG, "more than %d frames are asked for", MOST_FRAMES);
+    if (p->n == MOST_FRAMES) cli_stop(VG_EARG, "more than %d frames are requested", MOST_FRAMES);
     if (p->n == *cap) *cap = *cap ? 2 * *cap : 64, p->time = cli_resize(p->time, *cap, sizeof *p->time, "times");
     p->time[p->n++] = time;
 }
@@ -115,7 +115,7 @@ static void plan_even(plan *p, const vg_signal *s, const vg_retime *r)
     }
     if (opts.frames) step = opts.frames > 1 ? (last - first) / (double)(opts.frames - 1) : 1;
     double count = opts.frames ? (double)opts.frames : floor((last - first) / step + 1e-9) + 1;
-    if (!(count <= MOST_FRAMES)) cli_stop(VG_EARG, "more than %d frames are asked for", MOST_FRAMES);
+    if (!(count <= MOST_FRAMES)) cli_stop(VG_EARG, "more than %d frames are requested", MOST_FRAMES);
     for (size_t i = 0; i < (size_t)count; i++) {
         vg_err e;
         double t = fmin(first + (double)i * step, last);
@@ -132,7 +132,7 @@ static void read_edits(vg_signal *s, vg_retime *r)
     size_t size;
     char *text = cli_read_file(opts.edit, &size);
     if (vg_signal_edit(s, r, text, size, opts.edit, &e) < 0) cli_die(&e);
-    if (r->n == 1) cli_stop(VG_EINPUT, "'%s' has one line 'time': at least two say how time goes", opts.edit);
+    if (r->n == 1) cli_stop(VG_EINPUT, "'%s' has one line 'time': at least two are needed", opts.edit);
     free(text);
 }
 
@@ -143,7 +143,7 @@ static void plan_curve(plan *p, const vg_signal *s)
     bool controls;
     double *point = read_curve(opts.curve, &n, &controls);
     p->n = opts.frames ? (size_t)opts.frames : s->n;
-    if (p->n > MOST_FRAMES) cli_stop(VG_EARG, "more than %d frames are asked for", MOST_FRAMES);
+    if (p->n > MOST_FRAMES) cli_stop(VG_EARG, "more than %d frames are requested", MOST_FRAMES);
     p->place = cli_allocate(p->n, 2 * sizeof *p->place, "the curve");
     if (vg_signal_sketch(point, n, controls, p->n, p->place, &e) < 0) cli_stop(e.code, "'%s': %s", opts.curve, e.message);
     free(point);
@@ -158,7 +158,7 @@ typedef struct making {
     double *shapes, root[3]; /* of a batch; of the reference */
 } making;
 
-/* Shapes that are no vertices come as vectors. */
+/* Shapes that are not vertices are written as vectors. */
 static void prepare_vectors(making *m, vg_head *h, const vg_signal *s)
 {
     vg_err e;
@@ -181,7 +181,7 @@ static void finish_vectors(making *m, const vg_sampler *sampler, const double *t
     for (size_t i = 0; i < vg_graph_corners(m->graph); i++) vg_quat_apply(turn, f->values + 3 * i, f->values + 3 * i);
 }
 
-/* The name of the frame at or before the time, and how far behind it. */
+/* The name of the frame at or before the time, and the distance from it. */
 static void label(vg_frame *f, const vg_signal *s, const plan *p, size_t i)
 {
     vg_err e;
@@ -227,7 +227,7 @@ static void sample_batch(vg_sampler *sampler, const vg_signal *s, const plan *p,
     }
 }
 
-static void sample(vg_head *h, const vg_signal *s, const plan *p)
+static void sample_signal(vg_head *h, const vg_signal *s, const plan *p)
 {
     vg_err e;
     static vg_frame frames[VG_SAMPLER_BATCH];
@@ -284,14 +284,14 @@ int main(int argc, char **argv)
     vg_signal s;
     vg_head_take_out(&s, h, "signal"); /* the poses come without it */
     if (opts.edit) read_edits(&s, &retime);
-    if (opts.retime && retime.n) cli_usage("--retime and lines 'time' of --edit both say how time goes");
+    if (opts.retime && retime.n) cli_usage("--retime excludes lines 'time' of --edit");
     if (opts.retime) read_retime(opts.retime, s.n, &retime);
     if (opts.at) plan_list(&p, &s);
     else if (opts.curve) plan_curve(&p, &s);
     else plan_even(&p, &s, &retime);
     vg_source *other = NULL;
     if (opts.onto) h = change_body(h, &s, &other);
-    sample(h, &s, &p);
+    sample_signal(h, &s, &p);
     cli_stream_end(vg_source_tail(source));
     vg_retime_clear(&retime);
     vg_signal_clear(&s);

@@ -12,17 +12,17 @@ static struct {
 } opts = {.patches = "auto", .seed = 1};
 
 static const cli_option options[] = {
-    {"patches", 'k', "K|auto", "how many patches (default auto: as few as turn within 10 degrees of their faces)",
+    {"patches", 'k', "K|auto", "number of patches (default auto: the fewest within 10 degrees of their faces)",
      .text = &opts.patches},
     {"connected", 0, NULL, "every patch in one piece", .flag = &opts.connected},
-    {"seed", 0, "N", "another choice of first centres (default 1)", .integer = &opts.seed, .least = 0,
+    {"seed", 0, "N", "seed of the initial centres (default 1)", .integer = &opts.seed, .least = 0,
      .most = 4294967295.0},
     {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-segment",
     .synopsis = "[options] [FILE ...]",
-    .summary = "divide the faces of a sequence into patches that turn alike",
+    .summary = "divide the faces of a sequence into patches that rotate alike",
     .options = options,
     .most_operands = SIZE_MAX,
     .writes_stream = true,
@@ -63,7 +63,7 @@ int main(int argc, char **argv)
     if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->body.patches, &report, &e) < 0) cli_die(&e);
     vg_segmenter_free(&s);
     if (k && report.patches < k)
-        cli_warn("%zu patches instead of %zu: no more faces turn differently", report.patches, k);
+        cli_warn("%zu patches instead of %zu: no more faces rotate differently", report.patches, k);
     if (k && report.patches > k)
         cli_warn("%zu patches instead of %zu: the mesh has more components", report.patches, k);
     cli_note("%zu patches of %zu faces, %.2f degrees from their faces (rms), %zu rounds", report.patches,

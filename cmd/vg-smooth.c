@@ -31,16 +31,16 @@ static const cli_option options[] = {
     {"seconds", 0, "X", "span of the filter in time (default: 0.1)", .number = &opts.seconds, .least = 1e-9, .most = 1e9,
      .excludes = "frames"},
     {"frames", 0, "X", "the same in frames, whatever their times", .number = &opts.frames, .least = 1e-9, .most = 1000},
-    {"root", 0, "X", "another span for the motion of the body as a whole, in the same unit; 0: keep it",
+    {"root", 0, "X", "a separate span for the motion of the whole body, in the same unit; 0: keep it",
      .number = &opts.root, .least = 0, .most = 1e9},
-    {"memory", 0, "SIZE", "together: hold this much of the frames in memory, the rest in a file (default: 256M)",
+    {"memory", 0, "SIZE", "together: keep this much of the frames in memory, the rest in a file (default: 256M)",
      .take = take_memory},
     {0}};
 
 static const cli_program program = {
     .name = "vg-smooth",
     .synopsis = "[options] [FILE]",
-    .summary = "take noise out of a sequence",
+    .summary = "remove noise from a sequence",
     .options = options,
     .most_operands = 1,
     .writes_stream = true,
@@ -157,8 +157,8 @@ static void check_times(timing *t, const vg_frame *f)
     if (cli_given("frames")) return;
     double each = t->step != 0 && f->has_time ? f->time - t->last : 0;
     if (fabs(each - t->step) > 0.01 * fabs(t->step))
-        cli_stop(VG_EINPUT, "frame '%s' comes %g s after the one before it, and not %g s as the first ones: frames that are "
-                 "not evenly spaced have no span in seconds: use '--frames'", f->name, each, t->step);
+        cli_stop(VG_EINPUT, "frame '%s' comes %g s after the previous one, not %g s as the first ones: frames that "
+                            "are not evenly spaced have no span in seconds: use '--frames'", f->name, each, t->step);
     t->last = f->time;
 }
 
@@ -185,7 +185,7 @@ static void warn_degenerate(const timing *t)
 {
     vg_deform_stats c = vg_vector_smoother_get_stats(t->vectors);
     if (c.corners)
-        cli_warn("%llu corners without a direction took the turn of their face (the first in face %llu)",
+        cli_warn("%llu corners without a direction took the rotation of their face (the first in face %llu)",
                  (unsigned long long)c.corners, (unsigned long long)c.first_face);
 }
 
@@ -257,13 +257,13 @@ static void prepare_together(void *context, vg_head *h, vg_frame *in)
         cli_die(&e);
 }
 
-static void look(void *context, size_t n, vg_frame *in)
+static void collect_batch(void *context, size_t n, vg_frame *in)
 {
     together *t = context;
     const double *vertices[BATCH];
     vg_err e;
     for (size_t i = 0; i < n; i++) {
-        vg_frame_drop_all(&in[i]); /* what came with the vertices is not true of where they go */
+        vg_frame_drop_all(&in[i]); /* channels of the vertices are not valid for the new positions */
         vertices[i] = in[i].values;
         if (vg_poses_add(t->poses, &in[i], &e) < 0) cli_die(&e);
     }
@@ -308,7 +308,7 @@ static void write_together(void *context)
 static void smooth_together(vg_source *s)
 {
     static const step regions = {
-        .batch = BATCH, .unit = "frames", .init = prepare_together, .process = look, .finish = write_together};
+        .batch = BATCH, .unit = "frames", .init = prepare_together, .process = collect_batch, .finish = write_together};
     together t = {0};
     step_run(&regions, &t, s);
     vg_region_filter_free(&t.filter);
@@ -320,7 +320,7 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     if (opts.filter == TOGETHER && (cli_given("seconds") || cli_given("frames") || cli_given("root")))
-        cli_usage("'--filter together' looks at no time: it takes no '--seconds', '--frames' or '--root'");
+        cli_usage("'--filter together' does not use times: it takes no '--seconds', '--frames' or '--root'");
     if (opts.filter == TOGETHER && opts.on == ON_VECTORS)
         cli_usage("'--filter together' works on vertices: it takes no '--on vectors'");
     if (opts.filter != TOGETHER && cli_given("memory")) cli_usage("option '--memory' needs '--filter together'");

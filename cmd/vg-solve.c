@@ -24,16 +24,16 @@ static void take_planar_weights(const char *text, void *context)
 }
 
 static const cli_option options[] = {
-    {"weights", 0, "area|uniform", "count by the reference surface's metric (default), or every corner alike",
+    {"weights", 0, "area|uniform", "weights: the metric of the reference surface (default), or equal for all corners",
      .choice = &opts.weights},
     {"fit", 0, "absolute|squares", "least sum of the faces' misfits (default), or of their squares, which is faster",
      .choice = &opts.fit},
     {"rounds", 0, "N", "the most rounds of --fit absolute (default: 40)", .integer = &opts.rounds, .least = 1,
      .most = 100000},
-    {"eps", 0, "X", "misfits below this part of the mean count by their squares (default: 0.5)",
+    {"eps", 0, "X", "misfits below this fraction of the mean count by their squares (default: 0.5)",
      .number = &opts.eps, .least = 1e-6, .most = 1e6},
-    {"planar", 0, NULL, "make faces of four and more corners more nearly plane", .flag = &opts.planar},
-    {"planar-weights", 0, "W1,W2", "how much the vectors and how much the planes count (default: 0.5,1)",
+    {"planar", 0, NULL, "make faces with four or more corners more planar", .flag = &opts.planar},
+    {"planar-weights", 0, "W1,W2", "weights of the vectors and of planarity (default: 0.5,1)",
      .take = take_planar_weights, .needs = "planar"},
     {.name = NULL}};
 
@@ -231,7 +231,7 @@ static void solve_waiting(work *w)
 /* ---- pins ---- */
 
 /* Anchors and pins, ascending, each once. */
-static uint32_t *unite(const work *w, const vg_frame *f, size_t *n)
+static uint32_t *unite_held(const work *w, const vg_frame *f, size_t *n)
 {
     const vg_head *h = w->h;
     size_t npins;
@@ -263,7 +263,7 @@ static void drop_machines(work *w, size_t most)
     }
 }
 
-/* Waiting poses have machines of their own; with --planar they are large. */
+/* Waiting poses have separate solvers; with --planar they are large. */
 static bool is_crowded(const work *w)
 {
     size_t entries = 0;
@@ -302,7 +302,7 @@ static void find_machines(work *w, size_t n, const vg_frame *in, machine **of)
         vg_frame_pins(&in[i], &count);
         of[i] = &w->plain;
         if (count) {
-            uint32_t *both = unite(w, &in[i], &count);
+            uint32_t *both = unite_held(w, &in[i], &count);
             of[i] = find_machine(w, both, count);
         }
         if (w->npinned > before) made[fresh] = of[i], held[fresh] = of[i]->held, nheld[fresh++] = of[i]->nheld;
@@ -434,7 +434,7 @@ static void solve_rest(void *context)
     solve_waiting(context);
 }
 
-static void clear(work *w)
+static void clear_work(work *w)
 {
     vg_robust_free(&w->robust);
     drop_machines(w, 0);
@@ -442,7 +442,7 @@ static void clear(work *w)
     free_machine(w, &w->plain);
     if (opts.fit == 0) cli_note("least absolute misfit: at most %zu rounds", w->most_rounds);
     if (w->unfinished)
-        cli_warn("%zu poses are not at their least misfit: in the last of %ld rounds it still fell by 0.1 %% or more; "
+        cli_warn("%zu poses have not converged: in the last of %ld rounds the misfit still fell by 0.1 %% or more; "
                  "give more --rounds",
                  w->unfinished, opts.rounds);
     if (opts.planar)
@@ -487,7 +487,7 @@ int main(int argc, char **argv)
                         .process = take_batch,
                         .finish = solve_rest};
     step_run(&solve, &w, s);
-    clear(&w);
+    clear_work(&w);
     vg_source_close(&s);
     cli_finish(0);
 }

@@ -61,35 +61,36 @@ static void take_hold(const char *text, void *context)
 }
 
 static const cli_option options[] = {
-    {"model", 0, "auto|pca|fc|conv", "what stands around the recurrent layers (default auto)", .choice = &opts.model},
-    {"direction", 0, "shared|separate|forward", "chains both ways with one set of weights (default), two, or one way",
+    {"model", 0, "auto|pca|fc|conv", "the model around the recurrent layers (default auto)", .choice = &opts.model},
+    {"direction", 0, "shared|separate|forward", "chains in both directions with shared (default) or separate "
+                                                "weights, or forward only",
      .choice = &opts.direction},
-    {"layers", 0, "N", "recurrent layers (default 1, of the others 3)", .integer = &opts.layers, .least = 1, .most = 8},
-    {"hidden", 0, "N", "numbers in each (default 64, of the others 128)", .integer = &opts.hidden, .least = 1, .most = 4096},
-    {"iterations", 0, "N", "how many iterations (default 300, of pca 2500, of fc and conv 7000)",
+    {"layers", 0, "N", "recurrent layers (default 1, other models 3)", .integer = &opts.layers, .least = 1, .most = 8},
+    {"hidden", 0, "N", "size of each layer (default 64, other models 128)", .integer = &opts.hidden, .least = 1, .most = 4096},
+    {"iterations", 0, "N", "most iterations (default 300, pca 2500, fc and conv 7000)",
      .integer = &opts.iterations, .least = 1, .most = 100000000},
     {"batch", 0, "N", "sequences per iteration (default 8)", .integer = &opts.batch, .least = 1, .most = 4096},
-    {"frames", 0, "N", "frames of each sequence (default 32)", .integer = &opts.frames, .least = 3, .most = 100000},
-    {"step", 0, "N", "of which only every Nth is looked at (default 1)", .integer = &opts.step, .least = 1,
+    {"frames", 0, "N", "frames per sequence (default 32)", .integer = &opts.frames, .least = 3, .most = 100000},
+    {"step", 0, "N", "use only every Nth frame (default 1)", .integer = &opts.step, .least = 1,
      .most = 1000},
     {"given", 0, "N-M", "frames that are given, drawn anew each time (auto: 3-8, pca: 1-8, fc and conv: 1)",
      .take = take_given},
-    {"hold", 0, "SHARE", "of each sequence, what is not learned from but judged (default 0.2)", .number = &opts.hold,
+    {"hold", 0, "SHARE", "share of each sequence held out for evaluation (default 0.2)", .number = &opts.hold,
      .least = 0, .most = 0.9},
-    {"hold-at", 0, "N|end", "from this frame of each sequence on, or at its end (default: where the seed says)",
+    {"hold-at", 0, "N|end", "first frame of that block, or at the end (default: by the seed)",
      .take = take_hold},
-    {"rate", 0, "X", "of learning (default 0.001, of the others 0.002)", .number = &opts.rate, .least = 1e-9,
+    {"rate", 0, "X", "initial learning rate (default 0.001, other models 0.002)", .number = &opts.rate, .least = 1e-9,
      .most = 1},
     {"loss", 0, "NAME=W,...", "weights of bidirectional, kl and l2; 0 leaves one out", .take = take_loss},
-    {"nine", 0, NULL, "nine numbers a vertex, as printed, and not twelve", .flag = &opts.nine},
-    {"seed", 0, "N", "another choice of what is random (default 1)", .integer = &opts.seed, .least = 0,
+    {"nine", 0, NULL, "nine numbers per vertex, as published, not twelve", .flag = &opts.nine},
+    {"seed", 0, "N", "seed of all random choices (default 1)", .integer = &opts.seed, .least = 0,
      .most = 4294967295.0},
-    {"checkpoint", 0, "FILE", "write the unfinished network there at intervals", .text = &opts.checkpoint},
-    {"every", 0, "N", "with --checkpoint: iterations between two (default 100)", .integer = &opts.every, .least = 1,
+    {"checkpoint", 0, "FILE", "write the unfinished network to FILE periodically", .text = &opts.checkpoint},
+    {"every", 0, "N", "with --checkpoint: iterations between two of them (default 100)", .integer = &opts.every, .least = 1,
      .most = 100000000, .needs = "checkpoint"},
-    {"resume", 0, "FILE", "go on from a checkpoint, with the same poses and options", .text = &opts.resume,
+    {"resume", 0, "FILE", "resume from a checkpoint, with the same poses and options", .text = &opts.resume,
      .reads = true},
-    {"log", 0, "FILE", "a line for each iteration there: numbers with tabs between", .text = &opts.log},
+    {"log", 0, "FILE", "write a line of tab-separated numbers for each iteration", .text = &opts.log},
     {.name = NULL}};
 
 static const cli_program program = {
@@ -145,7 +146,7 @@ static void read_sequence(vg_trainer *t, vg_source *s)
     vg_trainer_cut(t);
 }
 
-/* The operands behind the first: sequences of the same mesh. */
+/* The operands after the first: sequences with the same mesh. */
 static void read_others(vg_trainer *t, vg_head *h, char **operands, size_t n)
 {
     vg_err e;
@@ -196,8 +197,9 @@ static void resume(vg_trainer *t)
     vg_head from = {0};
     if (!opts.resume) return;
     cli_load(&from, opts.resume, "mesh");
-    if (!from.network.model) cli_stop(VG_EINPUT, "'%.190s' holds no network: --resume takes what --checkpoint wrote", opts.resume);
-    if (vg_trainer_resume(t, &from.network, &e) < 0) cli_stop(VG_EINPUT, "cannot go on from '%.190s': %s", opts.resume, e.message);
+    if (!from.network.model) cli_stop(VG_EINPUT, "'%.190s' holds no network: --resume needs a file written by "
+                                                 "--checkpoint", opts.resume);
+    if (vg_trainer_resume(t, &from.network, &e) < 0) cli_stop(VG_EINPUT, "cannot resume from '%.190s': %s", opts.resume, e.message);
     vg_head_clear(&from);
 }
 
@@ -267,7 +269,7 @@ static void show(const vg_train_state *s)
 }
 
 /* True: to the end. */
-static bool learn(vg_trainer *t, vg_head *h, vg_train_state *s)
+static bool train_network(vg_trainer *t, vg_head *h, vg_train_state *s)
 {
     vg_err e;
     int r = 0;
@@ -301,7 +303,7 @@ static void print_row(const char *name, const vg_network_errors *x, int method)
     cli_say("%s", text);
 }
 
-/* the method of least error behind three given frames */
+/* the method with the least error after three given frames */
 static int best_of(const vg_network_errors *x, int most)
 {
     int best = 0;
@@ -314,7 +316,7 @@ static int best_of(const vg_network_errors *x, int most)
     return best;
 }
 
-static void report(vg_trainer *t, const vg_train_state *s)
+static void report_errors(vg_trainer *t, const vg_train_state *s)
 {
     static const char *const names[VG_NETWORK_METHODS] = {"the last frame again", "on in a line", "on in a line, damped",
                                                           "the regression alone", "the network"};
@@ -323,19 +325,19 @@ static void report(vg_trainer *t, const vg_train_state *s)
     cli_working("measuring held-out frames");
     if (vg_trainer_judge(t, &x, &e) < 0) cli_die(&e);
     if (!x.windows) {
-        cli_note("nothing is held out that could be judged");
+        cli_note("nothing is held out for evaluation");
         return;
     }
-    cli_say("%zu frames learned from, %zu held out: mean error of a vertex in %% of D, 5, 10 and 15 frames ahead", s->frames,
+    cli_say("%zu training frames, %zu held out: mean error of a vertex in %% of D, 5, 10 and 15 frames ahead", s->frames,
             s->held);
     cli_say("%-22s%24s%24s", "", "1 frame given", "3 frames given");
     for (int m = 0; m < VG_NETWORK_METHODS; m++) print_row(names[m], &x, m);
     int best = best_of(&x, VG_NETWORK_METHODS);
     if (best != VG_NETWORK_METHODS - 1)
-        cli_say("the network is beaten on what it has not seen: '%s' is nearer to the truth", names[best]);
+        cli_say("the network is worse on held-out frames than '%s'", names[best]);
 }
 
-/* What is written besides the network has names of its own. */
+/* Other outputs must have different names from the network. */
 static void check_outputs(void)
 {
     const char *names[] = {cli.output, opts.checkpoint, opts.log};
@@ -370,17 +372,17 @@ int main(int argc, char **argv)
     resume(t);
     vg_network_clear(&h->network);
     if (opts.checkpoint) signal(SIGINT, interrupt), signal(SIGTERM, interrupt);
-    if (!learn(t, h, &state)) {
+    if (!train_network(t, h, &state)) {
         if (is_first) write_checkpoint(t, h);
         vg_trainer_free(&t);
-        cli_stop(VG_ESYS, "interrupted after %llu iterations: go on with --resume %s", (unsigned long long)state.iteration,
+        cli_stop(VG_ESYS, "interrupted after %llu iterations: continue with --resume %s", (unsigned long long)state.iteration,
                  opts.checkpoint);
     }
     if (!is_first) {
         vg_trainer_free(&t);
         cli_finish(0);
     }
-    report(t, &state);
+    report_errors(t, &state);
     if (vg_trainer_network(t, true, &h->network, &e) < 0) cli_die(&e);
     vg_trainer_free(&t);
     cli_stream_open(h);

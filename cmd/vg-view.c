@@ -1,5 +1,5 @@
-/* vg-view.c: sequences as a page that plays them or as a contact sheet, with their shape, errors or scales.
- * Leaves out how a pose becomes pixels, and what is in a page: that is lib/view.
+/* vg-view.c: draws sequences as a page that plays them, a contact sheet or an animation, with their shape, errors or
+ * scales. Poses are drawn, and pages written, in lib/view.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "network_plot.h"
@@ -18,7 +18,7 @@ static struct {
     double scale, zoom, turn, fps;
     bool edges, ground, centred, silhouettes, scales, plain, pick;
     size_t kind, up, fit; /* 1: html, z, figure; kind 2: webp, 3: svg */
-    bool page, animated, svg; /* what is made, else a sheet */
+    bool page, animated, svg; /* kind of output; otherwise a sheet */
 } opts = {.view = "30,15"};
 
 static void take_beside(const char *value, void *context)
@@ -34,22 +34,22 @@ static const cli_option options[] = {
     {.name = "format", .value = "png|html|webp|svg", .text = &opts.format, .choice = &opts.kind,
      .help = "format of the output (default: from its name, else png)"},
     {.name = "frames", .value = "N",
-     .help = "sheet: N evenly spaced frames, or all when there are fewer (default: 8; animation: 1000)",
+     .help = "sheet: N evenly spaced frames, or all if there are fewer (default: 8; animation: 1000)",
      .integer = &opts.frames, .least = 1, .most = 10000},
-    {.name = "columns", .value = "N", .help = "sheet: frames side by side (default: what makes it about 16 : 9)",
+    {.name = "columns", .value = "N", .help = "sheet: frames side by side (default: for about 16 : 9)",
      .integer = &opts.columns, .least = 1, .most = 10000},
     {.name = "size", .value = "WxH", .help = "sheet: of the picture of one frame, in pixels (default: 360x360)",
      .text = &opts.size},
     {.name = "view", .value = "front|back|left|right|top|iso|A,E", .text = &opts.view,
      .help = "from where, or azimuth and elevation in degrees (default: 30,15)"},
-    {.name = "zoom", .value = "X", .help = "how large: 1 (the default) is what fits", .number = &opts.zoom,
+    {.name = "zoom", .value = "X", .help = "magnification: 1 (the default) fits the picture", .number = &opts.zoom,
      .least = 1e-3, .most = 1e3},
-    {.name = "turn", .value = "DEGREES", .help = "animation: go around the figure by so much from start to end",
+    {.name = "turn", .value = "DEGREES", .help = "animation: rotate the view by this angle from start to end",
      .number = &opts.turn, .least = -36000, .most = 36000},
     {.name = "up", .value = "y|z", .help = "the axis that points up (default: y)", .choice = &opts.up},
     {.name = "fit", .value = "path|figure", .choice = &opts.fit,
-     .help = "show the whole path with a camera that stays, or keep the figure in the middle (default: path; page: "
-             "figure if it goes far)"},
+     .help = "show the whole path with a fixed camera, or keep the figure in the middle (default: path; page: figure "
+             "if it goes far)"},
     {.name = "look-at", .value = "VERTEX|NAME", .text = &opts.look, .excludes = "fit",
      .help = "sheet, animation: keep a vertex, a joint, or an object, group or material of the mesh in the middle; with --zoom"},
     {.name = "ground", .help = "draw a grid where the reference pose stands, and a shadow", .flag = &opts.ground},
@@ -61,20 +61,20 @@ static const cli_option options[] = {
      .help = "page: click pairs of points on the mesh and the one beside it, and save them as markers for vg-register"},
     {.name = "patches", .value = "PATCHES", .help = "colour the faces by the patches of a stream of vg-segment",
      .text = &opts.patches, .reads = true},
-    {.name = "fps", .value = "N", .help = "page, animation: play N frames a second, whatever times they have", .number = &opts.fps,
+    {.name = "fps", .value = "N", .help = "page, animation: play N frames per second, ignoring their times", .number = &opts.fps,
      .least = 1e-3, .most = 1e6},
     {.name = "title", .value = "TEXT", .help = "page: its title (default: the name of the sequence)",
      .text = &opts.title},
-    {.name = "against", .value = "TRUTH", .help = "colour by the distance of each vertex from its place in TRUTH",
+    {.name = "against", .value = "TRUTH", .help = "colour by the distance of each vertex from its position in TRUTH",
      .text = &opts.against, .reads = true, .excludes = "scales|plain"},
     {.name = "centred", .letter = 'c', .flag = &opts.centred, .needs = "against",
      .help = "with --against: move the centroid of every pose to 0 before comparing"},
     {.name = "scales", .flag = &opts.scales,
-     .help = "colour by how much longer or shorter the vectors of each vertex are than in the reference pose"},
-    {.name = "plain", .help = "no colours, whatever the sequence brings", .flag = &opts.plain,
+     .help = "colour by the change of length of each vertex's vectors from the reference pose"},
+    {.name = "plain", .help = "no colours, even if the sequence has numbers", .flag = &opts.plain,
      .excludes = "scales|patches|scale"},
     {.name = "scale", .value = "X", .number = &opts.scale, .least = 1e-12, .most = 1e12,
-     .help = "where the colours end: an error in units of D, with --scales a factor (default: by the data)"},
+     .help = "end of the colour map: an error in units of D, with --scales a factor (default: from the data)"},
     {0},
 };
 
@@ -162,21 +162,22 @@ static void choose_kind(void)
                   cli.output);
     opts.page = opts.format ? opts.kind == 1 : html;
     opts.animated = opts.format ? opts.kind == 2 : webp;
-    if (!opts.animated && cli_given("turn")) cli_usage("option '--turn' is about an animation: use -o FILE.webp");
-    if (opts.animated && opts.columns) cli_usage("option '--columns' is about a sheet: the output is an animation");
+    if (!opts.animated && cli_given("turn")) cli_usage("option '--turn' applies to an animation: use -o FILE.webp");
+    if (opts.animated && opts.columns) cli_usage("option '--columns' applies to a sheet: the output is an animation");
     if (opts.page && (opts.frames || opts.columns || opts.size || opts.silhouettes))
-        cli_usage("option '--%s' is about a sheet: the output is a page",
+        cli_usage("option '--%s' applies to a sheet: the output is a page",
                   opts.frames ? "frames" : opts.columns ? "columns" : opts.size ? "size" : "silhouettes");
-    if (opts.page && opts.look) cli_usage("option '--look-at' is about a sheet or an animation: in a page one can turn and zoom");
+    if (opts.page && opts.look) cli_usage("option '--look-at' applies to a sheet or an animation: a page can be "
+                                          "rotated and zoomed");
     if (!opts.page && opts.patches && (opts.against || opts.scales))
         cli_usage("a sheet has one kind of colours: leave out --patches or --%s",
                   opts.against ? "against" : "scales");
     if (!opts.page && !opts.animated && opts.fps > 0)
-        cli_usage("option '--fps' is about a page or an animation: use -o FILE.html or -o FILE.webp");
-    if (opts.pick && !opts.page) cli_usage("option '--pick' is about a page: use -o FILE.html");
-    if (opts.pick && opts.nbeside != 1) cli_usage("option '--pick' is about two meshes: give --beside once");
+        cli_usage("option '--fps' applies to a page or an animation: use -o FILE.html or -o FILE.webp");
+    if (opts.pick && !opts.page) cli_usage("option '--pick' applies to a page: use -o FILE.html");
+    if (opts.pick && opts.nbeside != 1) cli_usage("option '--pick' applies to two meshes: give --beside once");
     if (opts.pick && !cli_given("view")) opts.view = "front";
-    if (!opts.page && opts.title) cli_usage("option '--title' is about a page: use -o FILE.html");
+    if (!opts.page && opts.title) cli_usage("option '--title' applies to a page: use -o FILE.html");
     if (!cli.output && isatty(STDOUT_FILENO))
         cli_usage("a %s is not written to a terminal: use -o FILE.html, FILE.png or FILE.webp",
                   opts.page ? "page" : "picture");
@@ -236,7 +237,7 @@ static void open_side(side *s, char **operands, size_t n)
     cli_need_vertices(s->head, s->name);
 }
 
-static bool next(side *s)
+static bool next_frame(side *s)
 {
     bool more = cli_next(s->source, &s->frame);
     if (more && opts.fps > 0) s->frame.has_time = true, s->frame.time = (double)s->frames / opts.fps;
@@ -290,7 +291,7 @@ static void close_cast(cast *c)
     for (size_t i = 0; i < opts.nbeside; i++) close_side(&c->beside[i]);
 }
 
-/* Takes a frame of sequence number i; truth: what it is compared with, or NULL. */
+/* Called with a frame of sequence i; truth: the frame it is compared with, or NULL. */
 typedef void take_frame(void *context, size_t i, const side *s, const double *truth);
 
 /* The next frame of what stands beside. Behind the end of the truth there is nothing to compare it with;
@@ -298,7 +299,7 @@ typedef void take_frame(void *context, size_t i, const side *s, const double *tr
 static bool put_beside(cast *c, size_t i, const double *truth, bool truth_is_shown, take_frame *put, void *context)
 {
     side *s = &c->beside[i];
-    if (!next(s)) return false;
+    if (!next_frame(s)) return false;
     if (truth || !c->compared[i]) put(context, i + 1 + truth_is_shown, s, c->compared[i] ? truth : NULL);
     return true;
 }
@@ -307,7 +308,7 @@ static bool put_beside(cast *c, size_t i, const double *truth, bool truth_is_sho
 static void read_cast(cast *c, bool shows_truth, take_frame *put, void *context)
 {
     for (bool more = true; more;) {
-        bool a = next(&c->result), b = opts.against && next(&c->truth);
+        bool a = next_frame(&c->result), b = opts.against && next_frame(&c->truth);
         const double *truth = b ? c->truth.frame.values : NULL;
         if (a) cli_progress("frames", c->result.frames);
         if (a && (b || !opts.against)) put(context, 0, &c->result, truth);
@@ -338,7 +339,7 @@ static void warn_scale(const cast *c)
     bool coloured = opts.against || opts.scales || c->result.coloured;
     for (size_t i = 0; i < opts.nbeside; i++) coloured |= c->beside[i].coloured;
     if (cli_given("scale") && !coloured)
-        cli_warn("--scale is where colours end, and there are none: the input brings no numbers of its vertices");
+        cli_warn("--scale sets the end of the colours, and there are none: the input has no numbers of its vertices");
 }
 
 /* An artefact has no frames: it is shown on the reference pose. */
@@ -434,7 +435,7 @@ static void sheet_frame(void *sheet, size_t i, const side *s, const double *trut
 static void refuse_options(const char *const *strange, size_t n, const char *what)
 {
     for (size_t i = 0; i < n; i++)
-        if (cli_given(strange[i])) cli_usage("option '--%s' is about a sequence: of a %s", strange[i], what);
+        if (cli_given(strange[i])) cli_usage("option '--%s' applies to a sequence: of a %s", strange[i], what);
 }
 
 static void refuse_sequence_options(const char *what)
@@ -459,7 +460,7 @@ static void make_plane(cast *c)
     refuse_sequence_options("signal the pose plane is drawn");
     if (opts.animated) cli_usage("a signal is drawn as PNG: an animation is made of the poses of vg-sample");
     if (opts.patches) take_patches(&c->result);
-    while (next(&c->result)) continue; /* to the end, so that damage is seen */
+    while (next_frame(&c->result)) continue; /* to the end, so that damage is seen */
     FILE *out = cli_text_open();
     if (vg_plane_write(c->result.head, &plane, fileno(out), cli.output ? cli.output : "standard output", &e) < 0) cli_die(&e);
     cli_text_end();
@@ -479,7 +480,7 @@ static void make_curves(cast *c)
     refuse_options(strange, sizeof strange / sizeof *strange, what);
     refuse_camera_options(what);
     refuse_sequence_options(what);
-    while (next(&c->result)) continue; /* to the end, so that damage is seen */
+    while (next_frame(&c->result)) continue; /* to the end, so that damage is seen */
     network_plot_write(&c->result.head->network, c->result.label, opts.svg);
 }
 
@@ -578,7 +579,7 @@ static void make_signal_page(cast *c)
                  "with 'vg-fitsignal --space vertices'");
     o.signal = true;
     if (opts.patches) take_patches(&c->result);
-    while (next(&c->result)) continue; /* to the end, so that damage is seen */
+    while (next_frame(&c->result)) continue; /* to the end, so that damage is seen */
     FILE *out = cli_text_open();
     if (vg_page_new(&page, fileno(out), cli.output ? cli.output : "standard output", &o, &e) < 0) cli_die(&e);
     add_sequence(page, &c->result);
@@ -615,7 +616,7 @@ int main(int argc, char **argv)
     static cast c;
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
-    sheet_options(); /* what is wrong with them is told before the input is opened */
+    sheet_options(); /* report errors in them before the input is opened */
     choose_kind();
     open_cast(&c, operands, n);
     colour_bones(c.result.head);

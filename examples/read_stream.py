@@ -511,7 +511,7 @@ class _Payload:
         if any(self.take(n)):
             self.fail(f"{what} not zero")
 
-    def utf8(self, n: int, long: str = "a text is longer than its record", bad: str = "a text is no UTF-8") -> str:
+    def utf8(self, n: int, long: str = "a text is longer than its record", bad: str = "a text is not UTF-8") -> str:
         if n > self.left():
             self.fail(long)
         data = bytes(self.take(n))
@@ -592,7 +592,7 @@ class _Reader:
         if not head:
             raise StreamError("it is empty: did the program before it fail?")
         if len(head) >= 4 and head[:4] != MAGIC[:4]:
-            raise StreamError("it is no vg stream")
+            raise StreamError("it is not a vg stream")
         if len(head) >= 7 and head[:7] != MAGIC[:7]:
             raise StreamError("it was damaged by a transfer that changes line ends")
         if len(head) < 16:
@@ -704,7 +704,7 @@ class _Reader:
         if not 1 <= dim <= 3:
             p.fail("a texture coordinate must have 1 to 3 numbers")
         if any(c >= nt and c != NO_TEXTURE for c in corners):
-            p.fail("a corner names a texture coordinate that is not there")
+            p.fail("a corner names a texture coordinate that does not exist")
         self.stream.texture = Texture(dim, coordinates, corners)
 
     def labl(self, p: _Payload):
@@ -712,7 +712,7 @@ class _Reader:
         faces, kinds, texts = p.u64s(n), p.u32s(n), p.texts(n)
         p.end()
         if any(f > self.stream.mesh.nf for f in faces) or any(a > b for a, b in zip(faces, faces[1:])):
-            p.fail("labels are not in the order of their faces, or of a face that is not there")
+            p.fail("labels are not in the order of their faces, or of a face that does not exist")
         if any(k not in LABEL_KINDS for k in kinds):
             p.fail("a label is of unknown kind")
         self.stream.labels = [(f, LABEL_KINDS[k], x) for f, k, x in zip(faces, kinds, texts)]
@@ -724,7 +724,7 @@ class _Reader:
         if not 1 <= n < INDEX_LIMIT or size == 0:
             p.fail("its counts are out of range")
         if any(v >= self.stream.mesh.nv for v in vertex):
-            p.fail("it names a vertex that is not there")
+            p.fail("it names a vertex that does not exist")
         self.stream.asset = (digest, vertex, data)
 
     def indices(self, p: _Payload, width: int = 1) -> array:
@@ -796,7 +796,7 @@ class _Reader:
         for f in range(nf):
             mine = slice(first[f], first[f + 1])
             if first[f] == first[f + 1]:
-                p.fail("a target face is driven by none")
+                p.fail("a target face has no driver")
             if any(s >= source[1] for s in source_face[mine]):
                 p.fail("a source face is out of range")
             if not all(w > 0 for w in weight[mine]):
@@ -810,7 +810,7 @@ class _Reader:
     def check_turns(self, p: _Payload, turns: array):
         for i in range(0, len(turns), 4):
             if abs(sum(x * x for x in turns[i:i + 4]) - 1) > 2e-6:
-                p.fail("a turn is no unit quaternion")
+                p.fail("a turn is not a unit quaternion")
 
     def rig(self, p: _Payload):
         rows = self.joints(p)
@@ -821,7 +821,7 @@ class _Reader:
         joints = self.checked(p, rows)
         self.check_turns(p, turns)
         if not any(j.channels for j in joints):
-            p.fail("none of its joints turns")
+            p.fail("none of its joints rotates")
         self.stream.rig = Rig(joints, at, turns, None, None)
 
     def skin(self, p: _Payload):
@@ -830,7 +830,7 @@ class _Reader:
         p.end()
         for v in range(0, 4 * nv, 4):
             if any(b >= rig.bones() for b in bone[v:v + 4]):
-                p.fail("a vertex is moved by a bone that is not there")
+                p.fail("a vertex is moved by a bone that does not exist")
             if weight[v + 3] < 0 or any(a < b for a, b in zip(weight[v:v + 3], weight[v + 1:v + 4])):
                 p.fail("weights are negative, or do not descend")
             if abs(sum(weight[v:v + 4]) - 1) >= 1e-9:
@@ -843,7 +843,7 @@ class _Reader:
         if not 1 <= count <= INDEX_LIMIT:
             p.fail("its count is out of range")
         if any(x >= count for x in patches):
-            p.fail("a face is in a patch that is not there")
+            p.fail("a face is in a patch that does not exist")
         self.stream.patches = (count, patches)
 
     def map_driver(self, p: _Payload, n: int, ng: int, bones: bool, per_corner: int):
@@ -854,11 +854,11 @@ class _Reader:
         if self.stream.rig is None:
             p.fail("a RIG record must come before it")
         if n != self.stream.rig.bones():
-            p.fail("it has not as many bones as the rig")
+            p.fail("its number of bones is not that of the rig")
         if not 1 <= per_corner <= 2:
             p.fail("a corner must have 1 or 2 bones")
         if ng:
-            p.fail("pairs of patches stand in a map of bones")
+            p.fail("a map of bones has hinges")
 
     def map(self, p: _Payload):
         n, nv, ng, nc, nh = (p.u64() for _ in range(5))
@@ -877,7 +877,7 @@ class _Reader:
         if nv != self.stream.mesh.nv:
             p.fail("its count does not fit the mesh")
         if kind not in (1, 2):
-            p.fail("it is driven by something unknown")
+            p.fail("its kind of transforms is unknown")
         if nnames not in (0, n):
             p.fail("names are missing")
         if size <= 0:
@@ -891,9 +891,9 @@ class _Reader:
         if any(not any(corners[i:i + 4 * per_corner]) for i in range(0, len(corners), 4 * per_corner)):
             p.fail("a quaternion is zero")
         if any(x >= n for x in corner_bones):
-            p.fail("a corner is moved by a bone that is not there")
+            p.fail("a corner is moved by a bone that does not exist")
         if any(x >= n for x in held_patch):
-            p.fail("a vertex is held by a transform that is not there")
+            p.fail("a vertex is held by a transform that does not exist")
         self.ascending(p, held, nv)
         self.stream.map = Map("bones" if bones else "patches", n, size, names, weights, place, centre, home_centre, share,
                               home if has_home else None, hinge_at, hinge_weight, corners, held_at, hinges, held,
@@ -935,23 +935,23 @@ class _Reader:
         if space == 1 and turns and turns - 1 != m:
             p.fail("its turns are not those of its examples")
         if space > 1 and examples:
-            p.fail("only shapes of vertices are of examples")
+            p.fail("only shapes of vertices can be sums of examples")
         if space > 1 and not rooted:
-            p.fail("the place of its shapes is not known")
+            p.fail("the kind of its shapes is unknown")
         if space > 1 and (space in (2, 3)) != (turns > 0):
             p.fail("its turns are not those of its shape space")
         self.check_turns(p, home)
         if any(not a < b for a, b in zip(parameter, parameter[1:])):
-            p.fail("its parameters do not rise")
+            p.fail("its parameters do not ascend")
         if any(not a <= b for a, b in zip(knot, knot[1:])):
             p.fail("its knots fall")
         if not knot[2] < knot[k - 1]:
-            p.fail("its knots span nothing")
+            p.fail("its knots span an empty interval")
         for what, numbers_ in (("a knot is too large", [*knot, *parameter]), ("a control point is too far away", control)):
             if any(abs(x) > 1e100 for x in numbers_):
                 p.fail(what)
         if any(x >= n for x in site):
-            p.fail("a site is no frame")
+            p.fail("a site is not a frame")
         if len(set(site)) < sites:
             p.fail("a frame is a site twice")
         if any(abs(x) > 1e100 for x in position):
@@ -991,7 +991,7 @@ class _Reader:
         yield c["width"] not in (9, 12), "its features are not 9 or 12 numbers"
         yield 0 in (k, c["parts"], c["step"]), "a count is 0"
         yield c["numbers"] != (k if linear else features), "its frames have a wrong number of numbers"
-        yield c["sets"] != (2 if c["direction"] == 1 else 1), "its sets of parameters do not suit its direction"
+        yield c["sets"] != (2 if c["direction"] == 1 else 1), "its sets of parameters do not match its direction"
         yield linear and c["uncertain"], "a network of coordinates has no variance"
         yield c["step"] > 1 << 16, "its step is too large"
         yield c["numbers"] > (1 << 27) - 2, "its frames have too many numbers"
@@ -1041,7 +1041,7 @@ class _Reader:
         if s.map and len(s.map.corners) not in (0, 4 * s.map.per_corner * sum(map(len, s.graph()))):
             p.fail("the corners of record MAP do not fit the mesh")
         if s.map and s.map.kind == "patches" and (s.patches is None or s.patches[0] != len(s.map.centre) // 3):
-            p.fail("record MAP has not as many patches as record PTCH")
+            p.fail("records MAP and PTCH have different numbers of patches")
         if s.signal and s.signal.space > 1 and s.links is None:
             p.fail("record SIGN needs a LINK record")
         if s.width == 0:
@@ -1095,7 +1095,7 @@ class _Reader:
         s = self.stream
         if (name in ("root", "anchors") and s.element != "corner") or (name == "pins" and s.kind != "vectors") or \
                 (name == "turns" and (s.kind != "vertices" or not s.skeleton)):
-            fail("it does not go with these frames")
+            fail("it does not belong to these frames")
         if width * count * (8 if kind == F64 else 4) > p.left():
             fail("it is shorter than its counts say")
         if kind == INDICES:
@@ -1143,7 +1143,7 @@ class _Reader:
             raise StreamError("the END record has a wrong length")
         count, running = p.u64(), p.u64()
         if count != self.index():
-            raise StreamError(f"the END mark counts {count} records, {self.index()} came")
+            raise StreamError(f"the END mark states {count} records, but there were {self.index()}")
         if running != xxh64(bytes(self.sums)):
             raise StreamError("the END mark's checksum is wrong: records were changed or moved")
         self.stream.tail, self.stream.checksum, self.done = self.pending, running, True

@@ -165,7 +165,7 @@ END
     walk 3 6 >long.bvh
     pipe 'vg-encode walk.bvh | vg-encode --reference long.bvh >mixed.vgs' # the legs of one, the reference of the other
     must_warn vg-decode mixed.vgs -o out.bvh
-    says "not kept in 'out.bvh': the lengths of the bones as they change: joint '"
+    says "not kept in 'out.bvh': changes of the lengths of bones: joint '"
     one_line
 }
 
@@ -175,7 +175,7 @@ END
     says "'a.bvh' line" "a channel (Xposition ... Zrotation) expected, not 'Rotation'"
     walk 3 | sed '$d' >b.bvh
     must_fail 3 vg-decode b.bvh -o out.bvh
-    says "'b.bvh' ends in frame 2 of 3, behind 0 of 22 values"
+    says "'b.bvh' ends in frame 2 of 3, after 0 of 22 values"
     walk 3 0 -1 >c.bvh
     must_fail 3 vg-info c.bvh
     says "the frame time is not positive"

@@ -114,7 +114,7 @@ END
     for to in back/ back.zip back.7z; do
         must_warn vg-decode --f64 back.vgs -o $to
         one_line
-        says 'number in front' "'0001_pose1~pose2@0.5.obj'"
+        says 'number as prefix' "'0001_pose1~pose2@0.5.obj'"
         must vg-diff -t 1e-12 back.vgs $to
     done
     [ "$(ls back | head -n 1)" = 0000_pose2.obj ]
@@ -149,7 +149,7 @@ END
     [ "$(echo p-*.ply)" = 'p-00.ply p-01.ply p-02.ply p-03.ply' ]
 }
 
-@test "a failure leaves nothing: cut input, a place that is not there" {
+@test "a failure leaves nothing: cut input, a place that does not exist" {
     poses cube 5
     must vg-encode pose*.obj -o in.vgs
     head -c -16 in.vgs >cut.vgs
@@ -198,7 +198,7 @@ END
                 must vg-decode ../in.vgs -o $to
             else
                 must_warn vg-decode ../in.vgs -o $to
-                says 'number in front'
+                says 'number as prefix'
             fi
             must vg-info $to
             shows 'frames     1: '

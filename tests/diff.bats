@@ -431,7 +431,7 @@ END
     mesh cube >a.obj
     mesh tetra >b.obj
     must_fail 2 vg-diff a.obj a.obj --heat - --json
-    says "option '--json' is about the report"
+    says "option '--json' applies to the report"
     must_fail 2 vg-diff a.obj a.obj --heat x -o x
     must_fail 2 vg-diff a.obj a.obj --heat x.png
     says "the output is a stream"

@@ -147,7 +147,7 @@ assert [[x.tag for x in f.extra] for f in s.frames] == [["XNON"]] and [x.tag for
 END
 }
 
-@test "--take: what is no list of frames, or asks for a frame that is not there" {
+@test "--take: what is no list of frames, or asks for a frame that does not exist" {
     poses cube 3
     for frames in '' ',' '1,' ',1' '1,,2' a 1-a -1 2-1 2,1 1,1 0-1,1 0-,2 1/2 0-/ 0-/0 0-/-1 99999999999999999999; do
         must_fail 2 vg-encode "--take=$frames" 'pose*.obj' -o out.vgs

@@ -59,7 +59,7 @@ END
     must_warn vg-features -v "$(horse vgs)" -o v.vgs
     says "0 times an edge over which the rotation jumps by more than half a turn"
     says "0 vertices whose neighbourhood is degenerate"
-    [[ $stderr =~ "largest error of the way back: "[0-9.]+e-1[0-9]" D" ]] || fail "$stderr"
+    [[ $stderr =~ "largest error of the reconstruction: "[0-9.]+e-1[0-9]" D" ]] || fail "$stderr"
 }
 
 @test "Python learns from features by NPZ, and vg-solve takes what it made" {
@@ -96,7 +96,7 @@ END
     must_fail 3 vg-encode homeless.npz -o no.vgs
     says "none called 'reference'"
     pipe_fail 3 "vg-encode still.npz | vg-solve -o no.vgs"
-    says "has a 'root_turn' that is no rotation"
+    says "has a 'root_turn' that is not a rotation"
     [ ! -e no.vgs ]
 }
 

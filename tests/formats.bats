@@ -152,7 +152,7 @@ END
     must_fail 3 vg-encode indices.npz -o no.vgs
     says "array 'faces' in 'indices.npz' holds an index that is out of range"
     must_fail 3 vg-encode letters.npz -o no.vgs
-    says "array 'names' in 'letters.npz' holds a letter that does not exist"
+    says "array 'names' in 'letters.npz' holds an invalid code point"
     must_fail 3 vg-encode quaternion.npz -o no.vgs
     says "array 'deformations' in 'quaternion.npz' holds a quaternion that is zero"
     must_fail 3 vg-encode unlinked.npz -o no.vgs
@@ -285,9 +285,9 @@ END
     shows pose1 walk.0001 walk.0003
     mesh two >walk.ply # what a file is, is told by its content
     must_fail 3 vg-encode walk.pc2 -o out.vgs
-    says "'walk.pc2' has 8 points where 'walk.ply' has 12 vertices"
+    says "'walk.pc2' has 8 points, but 'walk.ply' has 12 vertices"
     must_fail 2 vg-encode --mesh pose1.obj walk.vgs -o out.vgs
-    says "which brings its own mesh"
+    says "which has its own mesh"
 }
 
 @test "the mesh beside a cache is never written over another one" {
@@ -295,7 +295,7 @@ END
     mesh tetra >walk.obj
     cp walk.obj kept.obj
     must_fail 2 vg-decode -o walk.pc2 walk.vgs
-    says "'walk.obj', which goes with 'walk.pc2', is there already" --no-mesh
+    says "'walk.obj', the mesh for 'walk.pc2', exists" --no-mesh
     one_line
     same_file walk.obj kept.obj
     [ ! -e walk.pc2 ]

@@ -136,11 +136,11 @@ END
     local name
     for name in outside root web; do
         must_fail 3 vg-encode $name.gltf -o out.vgs
-        says 'only files beside or below are read'
+        says 'only files in the same directory or below it are read'
     done
     must_fail 4 vg-encode gone.gltf -o out.vgs
     must_fail 3 vg-encode - -o out.vgs <beside.gltf
-    says 'is a file beside, which cannot be found from here'
+    says 'is a separate file, which cannot be found from here'
     head -c 100 'my data.bin' >short && mv short 'my data.bin'
     must_fail 3 vg-encode beside.gltf -o out.vgs
     [ ! -e out.vgs ]
@@ -217,9 +217,9 @@ END
     must_fail 2 vg-decode --max-targets 12 -o bar2.glb bar.vgs
     says 'leave out --max-targets'
     must_fail 3 vg-decode -o bar-%d.obj bar.vgs
-    says "make vertices of them with 'vg-play MAP' first, or of a rig's a skin in a .glb"
+    says "convert them to vertices with 'vg-play MAP' first, or write those of a rig as a skin to a .glb"
     must_fail 3 vg-decode -o none.glb "$GOLDEN/transforms.vgs"
-    says 'transforms of no skeleton'
+    says 'transforms without a skeleton'
 }
 
 @test "a character comes back: nodes, materials, picture, skin, texture coordinates, colours, normals" {

@@ -342,7 +342,7 @@ END
         done
     done
     must_fail 4 vg-decode a.obj -o d/
-    says "'d/a.obj': it is a link to a file that is not there"
+    says "'d/a.obj': it is a link to a file that does not exist"
     [ -L dangling ] && [ -L loop ] && [ -L d/a.obj ]
     nothing_but a.obj d dangling loop
 }

@@ -173,7 +173,7 @@ END
 @test "wrong usage" {
     poses cube 2
     must_fail 2 vg-interpolate 3 --at 0.5 pose1.obj
-    says "--at says which poses are written"
+    says "--at defines which poses are written"
     must_fail 2 vg-interpolate --smooth pose1.obj
     says "the number of poses is from 1"
     must_fail 2 vg-interpolate 0 pose1.obj
@@ -185,7 +185,7 @@ END
 @test "one pose is no path, and numbers that overflow are refused" {
     poses cube 2
     pipe_fail 3 "vg-encode pose1.obj | vg-interpolate 3 >out.vgs"
-    says "there is one pose in the input, and a path needs two or more"
+    says "there is one pose in the input, but a path needs at least two"
     LC_ALL=C awk '$1 == "v" {print "v", 9 * $2, 9 * $3, 9 * $4; next} {print}' pose1.obj >large.obj
     pipe_fail 2 "vg-encode pose1.obj large.obj | vg-interpolate --at 1e6 >out.vgs"
     says "so far outside that numbers overflow"

@@ -25,7 +25,7 @@ mistake() {
     # files that are not there, are no meshes, are of different meshes
     mistake 4 'vg-encode missing.obj' "cannot open 'missing.obj': No such file or directory"
     mistake 4 'vg-encode "*.fbx"' "no file matches '*.fbx'"
-    mistake 3 'vg-encode notes.txt' "cannot tell what 'notes.txt' is" "OBJ, PLY" "GLB" "export other kinds"
+    mistake 3 'vg-encode notes.txt' "cannot tell what 'notes.txt' is" "OBJ, PLY" "GLB" "export it"
     mistake 3 'vg-encode empty' "directory 'empty' holds no mesh file (OBJ"
     mistake 3 'vg-encode pose1.obj tetra.obj' "has 4 vertices where 'pose1.obj' has 8: all poses of a sequence have the same vertices"
     mistake 3 'vg-deform --onto tetra.obj walk.vgs' "pair them with vg-register and --correspondence"
@@ -41,7 +41,7 @@ mistake() {
     mistake 3 'vg-solve deformations.vgs' "apply them with 'vg-deform --onto MESH'"
     mistake 3 'vg-play walk.vgs walk.vgs' "make one with vg-fitmap"
     mistake 2 'vg-fitmap walk.vgs' "--patches, made by vg-segment"
-    mistake 3 'true | vg-solve' "standard input is empty: look at the program before in the pipe"
+    mistake 3 'true | vg-solve' "standard input is empty: did the program before it fail?"
 
     # the output's name
     mistake 2 'vg-decode walk.vgs' "name the output: -o poses.zip, -o 'pose-%04d.obj', or -o poses/"

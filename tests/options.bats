@@ -38,7 +38,7 @@ setup() {
     done
     refused 'vg-fitmap --learn --groups g walk.vgs -o out' '--learn needs --skeleton'
     refused 'vg-fitmap --root-at 0,0,0 --groups g walk.vgs -o out' '--root-at needs --skeleton'
-    refused 'vg-retarget --morph 1 map.vgs -o out' 'name the body that the map is brought to: --onto MESH'
+    refused 'vg-retarget --morph 1 map.vgs -o out' 'name the new body: --onto MESH'
     refused 'vg-diff --of mean walk.vgs walk.vgs -o out' '--of needs --tolerance'
     refused 'vg-diff --no-provenance walk.vgs walk.vgs -o out' '--no-provenance' '--heat'
     refused 'vg-register --aligned --keep-all pose1.obj target.obj -o out' '--keep-all needs --markers'
@@ -73,7 +73,7 @@ setup() {
 }
 
 @test "options that exclude each other" {
-    refused 'vg-interpolate 3 --at 1 walk.vgs -o out' "--at says which poses are written" "'3'"
+    refused 'vg-interpolate 3 --at 1 walk.vgs -o out' "--at defines which poses are written" "'3'"
     refused 'vg-play map.vgs --live --at 1 walk.vgs -o out' '--live does not go with --at'
     refused 'vg-play map.vgs --interpolate 3 --at 1 walk.vgs -o out' '--interpolate does not go with --at'
     refused 'vg-deform --onto target.obj --by shape --correspondence c walk.vgs -o out' '--by shape' '--correspondence'

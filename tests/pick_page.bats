@@ -148,7 +148,7 @@ END
     write_pair
     must_fail 2 vg-view a.obj --pick -o pick.html
     must_fail 2 vg-view a.obj --beside b.obj --pick -o pick.png
-    says "'--pick' is about a page"
+    says "'--pick' applies to a page"
     must_fail 2 vg-view a.obj --beside b.obj --beside a.obj --pick -o pick.html
     says 'give --beside once'
     must_fail 2 vg-view a.obj --beside b.obj --pick --scales -o pick.html

@@ -192,7 +192,7 @@ END
     for key in '' = =a.obj 3 3= walk; do must_fail 2 vg-poisson --key "$key" u.vgs -o t.vgs; done
     says "option '--key' needs FRAME=MESH, not 'walk'"
     must_fail 2 vg-poisson --first a.obj --first b.obj u.vgs -o t.vgs
-    says "option '--first' is there twice"
+    says "option '--first' is given twice"
     for size in '' M 3X -1 1.5M 99999999999999999999 1MM; do
         must_fail 2 vg-poisson --memory "$size" --first a.obj u.vgs -o t.vgs
         says "option '--memory' needs a size such as 64M or 2G, not '$size'"

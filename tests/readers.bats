@@ -171,13 +171,13 @@ EOF
     { solid a 0; solid b 1; printf '\nwritten by hand\n'; } >text.stl
     must_warn vg-encode text.stl -o out.vgs
     one_line
-    says "left out what stands behind the last solid, from line 20 on"
+    says "left out data after the last solid, from line 20 on"
     geometry text.stl
     [ "$(tail -2 <<<"$output")" = $'3 0 1 2\n3 3 4 5' ] || fail "$output"
     cp "$DATA"/reports/bin_extra.stl more.stl
     head -c 60 /dev/zero >>more.stl
     must_warn vg-encode more.stl -o out.vgs
-    says "left out 67 bytes behind the last triangle"
+    says "left out 67 bytes after the last triangle"
     head -c 100 more.stl >cut.stl
     must_fail 3 vg-encode cut.stl -o out.vgs
 }
@@ -186,17 +186,17 @@ EOF
     cp "$DATA"/reports/*.bvh .
     { cat frames_more.bvh; printf '\n\n1 2 3 1 1 1 1 1 1\n\n'; } >blank.bvh
     must_warn vg-encode blank.bvh -o out.vgs
-    says "it announces 1 frames and holds 3, which are read"
+    says "it announces 1 frames but holds 3, which are read"
     sed 's/Frames: 1/Frames: 0/' frames_more.bvh >none.bvh
     must_warn vg-encode none.bvh -o out.vgs
-    says "it announces 0 frames and holds 2, which are read"
+    says "it announces 0 frames but holds 2, which are read"
     sed 's/Frames: 1/Frames: 5/' frames_more.bvh >fewer.bvh
     must_fail 3 vg-encode fewer.bvh -o out.vgs
     one_line
     says "'fewer.bvh' ends in frame 2 of 5"
     { cat frames_more.bvh; echo '1 2 3'; } >part.bvh
     must_fail 3 vg-encode part.bvh -o out.vgs
-    says "'part.bvh' line 21: a row of 3 values"
+    says "'part.bvh' line 21: a row has 3 values"
     # no motion: a skeleton with a branch, and one in small letters with a mark and Windows' line ends
     printf 'HIERARCHY\nROOT a\n{\nOFFSET 1 2 3\nCHANNELS 3 Zrotation Xrotation Yrotation\nJOINT b\n{\nOFFSET 0 1 0\nCHANNELS 0\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\nJOINT c\n{\nOFFSET 1 0 0\nCHANNELS 0\nEndSite\n{\nOFFSET 1 0 0\n}\n}\n}\n' >branch.bvh
     geometry branch.bvh
@@ -268,7 +268,7 @@ EOF
     [ "$(cat out/frame_009.obj)" = $'v 0 0 1\nv 1 0 1\nv 0 1 1\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl skin\nf 1/1 2/2 3/3' ] || fail "$(cat out/frame_009.obj)"
     must_fail 3 vg-encode --objects frames other.obj -o no.vgs
     one_line
-    says "'other.obj' is no sequence of objects"
+    says "'other.obj' is not a sequence of objects"
     # in an archive, from a pipe, and with degenerate faces, which are counted once
     tar cf walk.tar walk.obj
     pipe 'vg-encode --objects frames walk.tar | vg-info --digest'

@@ -77,7 +77,7 @@ number() {
     capture vg-register v.obj t.obj -m m.txt -o c.vgs
     [ "$status" = 0 ]
     one_line
-    says " of the 838 faces of the target's component 0 have no counterpart: they ride with those beside them"
+    says " of the 838 faces of the target's component 0 have no counterpart: they follow those beside them"
     [ "$(number c.vgs matched_faces)" -gt 700 ]
     must vg-register -q v.obj t.obj -m m.txt -o c.vgs
 }
@@ -105,7 +105,7 @@ number() {
     says "warning: marker 'm9' (line 9), vertex $(awk '$1 == "m9" {print $2}' one.txt) on vertex 660, is 0." ' D from where its neighbours expect it' \
         'it is left out'
     must_warn vg-register --keep-all --index-base 1 walk-man.obj walk-woman.obj -m wrong.txt -o k.vgs
-    says 'it is used all the same'
+    says 'it is used anyway'
     must_warn vg-register -v walk-man.obj walk-woman.obj -m one.txt --index-base 1 -o v.vgs
     says 'round 8 of 8: ' 'the source as a whole: scale 0.95' "marker 'm1' (line 1): " \
         '1584 of 1584 faces of the target matched'
@@ -144,7 +144,7 @@ number() {
 @test "usage" {
     mesh cube >a.obj
     must_fail 2 vg-register a.obj a.obj -o c.vgs
-    says 'nothing says which point belongs to which: give --markers FILE, --dense FILE, --uv, or --aligned'
+    says 'there are no pairs of points: give --markers FILE, --dense FILE, --uv, or --aligned'
     must_fail 2 vg-register a.obj --aligned -o c.vgs
     says 'two meshes are needed: SOURCE and TARGET'
     must_fail 2 vg-register --dense a --dense-source b a.obj a.obj -o c.vgs
@@ -158,7 +158,7 @@ number() {
     mesh cube >a.obj
     printf '0 0\n1 1\n' >two.txt
     must_fail 3 vg-register a.obj a.obj -m two.txt -o c.vgs
-    says '2 pairs do not say how the meshes lie: give at least three that are not in line'
+    says '2 pairs do not determine the alignment: give at least three that are not collinear'
     one_line
     printf '0 0\nnose 1 8\n2 2\n' >out.txt
     must_fail 3 vg-register a.obj a.obj -m out.txt -o c.vgs
@@ -181,7 +181,7 @@ number() {
       grep '^f ' "$horse" | awk -v n="$n" '{for (i = 2; i <= NF; i++) $i += n; print}'; } >two.obj
     awk -v n="$n" 'BEGIN {for (i = 0; i < n; i += 12) print i, i}' >markers.txt
     must_warn vg-register two.obj "$horse" --markers markers.txt -o default.vgs
-    says '1 of the 2 components of the source explain nothing of the target and are left out: 1'
+    says '1 of the 2 components of the source match no part of the target and are left out: 1'
     must vg-register two.obj "$horse" --markers markers.txt --components 0 -o one.vgs
     must vg-register -q two.obj "$horse" --markers markers.txt --components all -o all.vgs
     # the same pairs by default as by --components 0

@@ -64,7 +64,7 @@ EOF
     must vg-decode -o back.obj out.vgs
     grep -qx 'f 1/1 2 3/2' back.obj || fail "the wrong texture coordinate was left out" "$(cat back.obj)"
     must_warn vg-encode bin_extra.stl -o out.vgs
-    says "left out 7 bytes behind the last triangle"
+    says "left out 7 bytes after the last triangle"
     geometry multiline_face.off
     [ "$(tail -1 <<<"$output")" = "4 0 1 2 3" ] || fail "$output"
     geometry tristrips.ply
@@ -75,7 +75,7 @@ EOF
     reports
     must_warn vg-encode frames_more.bvh -o out.vgs
     one_line
-    says "it announces 1 frames and holds 2, which are read"
+    says "it announces 1 frames but holds 2, which are read"
     pipe 'vg-info out.vgs'
     shows 'frames     2'
     must vg-encode nomotion.bvh -o still.vgs
@@ -89,11 +89,11 @@ EOF
     printf '0 0 0 0 0 0 0 0\n1 2 3 10 20 30 40 50 60 70\n' >>shifted.bvh
     must_fail 3 vg-encode shifted.bvh -o out.vgs
     one_line
-    says "'shifted.bvh' line 19: a row of 8 values, and the channels are 9"
+    says "'shifted.bvh' line 19: a row has 8 values, but there are 9 channels"
     head -n 19 frames_more.bvh >long.bvh
     printf '1 2 3 10 20 30 40 50 60 70\n' >>long.bvh
     must_fail 3 vg-encode long.bvh -o out.vgs
-    says "'long.bvh' line 20: a row of 10 values"
+    says "'long.bvh' line 20: a row has 10 values"
     cat >scales.bvh <<'EOF'
 HIERARCHY
 ROOT Hips
@@ -465,5 +465,5 @@ assert [[c[0] for c in face] for face in f] == [[0, 1, 2], [0, 2, 3]], f
 assert [vt[c[1]] for face in f for c in face] == [(0, 0), (0.5, 0), (0.5, 0.75), (0.5, 0), (1, 1), (0.5, 1)], (vt, f)
 EOF
     must_warn vg-encode short.gltf -o short.vgs
-    says "left out wrong texture coordinates"
+    says "left out malformed texture coordinates"
 }

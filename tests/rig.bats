@@ -428,7 +428,7 @@ stiff = [(root, angles[:3] + [(0.0, 0.0, 0.0)]) for root, angles in poses]
 write("stiff", stiff, NAMES[:3])
 END
     must_warn vg-play chain.rig stiff.bvh -o out.vgs
-    says '1 of 4 bones have no joint of the skeleton that belongs to them'
+    says '1 of 4 bones have no matching joint of the skeleton'
     one_line
     must vg-diff -t 1e-9 stiff/ out.vgs
     # twice as large: the rig keeps its size, and goes half as far

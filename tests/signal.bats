@@ -166,7 +166,7 @@ assert math.dist(v[2], v[4]) < 0.9, v"
     must vg-view hinge.signal -o plane.png
     printf 'v 0 0 0\nv 1 0 0\n' >points.obj
     must_fail 3 vg-fitsignal --space gradients points.obj points.obj -o out.vgs
-    says "the mesh has no faces: only vertices are a space of shapes then"
+    says "the mesh has no faces: its shape space can only be vertices"
     [ ! -e out.vgs ]
 }
 
@@ -190,7 +190,7 @@ assert [(a['x'], a['y']) for a in f] == [(i % 5, i * i % 7) for i in range(1, 22
     [[ $output == *"'long.txt' line 22: there are only 21 frames to place"* ]]
     echo '1 x' >bad.txt
     run -3 vg-fitsignal --place bad.txt "$(horse vgs)" -o out.signal
-    [[ $output == *"'bad.txt' line 1: two numbers are wanted"* ]]
+    [[ $output == *"'bad.txt' line 1: two numbers expected"* ]]
 }
 
 @test "--layout, --sites; what does not exist is said" {
@@ -208,7 +208,7 @@ assert [(a['x'], a['y']) for a in f] == [(i % 5, i * i % 7) for i in range(1, 22
     must_fail 2 vg-fitsignal --pin 99=1,1 "$(trex vgs)" -o out.vgs
     says 'there is no frame 99'
     must_fail 3 vg-fitsignal "$DATA/horse.rest.obj" -o out.vgs
-    says 'a signal needs at least 2 frames, and there is 1'
+    says 'a signal needs at least 2 frames, but there is 1'
     must_fail 3 vg-sample "$(horse vgs)" -o out.vgs
     says 'the input holds no signal: make one with vg-fitsignal'
     [ ! -e out.vgs ]
@@ -303,7 +303,7 @@ END
     for edit in 'frame 3 0.1 0.2' 'site 3' 'site -3' 'remove 4'; do
         echo "$edit" >one.txt
         capture vg-sample --edit one.txt "$(trex signal)" -o one.vgs
-        if [ "$status" = 3 ]; then says "frame 3 is no site"; else [ "$status" = 0 ]; fi
+        if [ "$status" = 3 ]; then says "frame 3 is not a site"; else [ "$status" = 0 ]; fi
     done
 }
 
@@ -364,7 +364,7 @@ for a in json.load(sys.stdin)['frame_errors'][2:9]: print(repr(a['x']), repr(a['
     says "'mixed.txt' line 2: control points and points that the curve goes through are mixed"
     printf '1 1\n' >short.txt
     must_fail 3 vg-sample --curve short.txt full.signal -o out.vgs
-    says 'a curve takes at least 2 points'
+    says 'a curve needs at least 2 points'
 }
 
 @test "vg-info: the numbers of a signal, and its places as an edit that changes nothing" {
@@ -466,7 +466,7 @@ END
     says "--examples needs --onto"
     must_fail 2 vg-deform --onto heavy.vgs --examples - - man.vgs -o out2.vgs
     must_fail 3 vg-deform --onto heavy.vgs --examples some.vgs heavy.vgs man.vgs -o out2.vgs
-    says "they must be the same ones"
+    says "they must match"
     must_fail 3 vg-deform --onto heavy.vgs --examples man.vgs heavy.vgs man.vgs -o out2.vgs
     says "one of them is the reference pose"
     must_fail 3 vg-deform --onto heavy.vgs --examples "$(trex vgs)" heavy.vgs man.vgs -o out2.vgs
@@ -604,9 +604,9 @@ assert sum(a * a for a in left) > 0
 END
     vg-encode --take 0-2 man.vgs -o three.vgs
     must_fail 3 vg-sample --onto three.vgs of-some.signal -o no.vgs
-    says "there are 3 poses, and the signal has 4 examples: they must be the same ones"
+    says "there are 3 poses, but the signal has 4 examples: they must match"
     must_fail 3 vg-sample --onto other.vgs "$(trex signal)" -o no.vgs
-    says "the signal's shapes are no sums of examples: fit it with vg-fitsignal --examples"
+    says "the signal's shapes are not sums of examples: fit it with vg-fitsignal --examples"
     vg-encode man.vgs three.vgs -o twice.vgs
     must_fail 3 vg-fitsignal --examples twice.vgs man.vgs -o no.signal
     says "the examples are not independent"
@@ -663,7 +663,7 @@ END
     cmp cross.png again.png
     must vg-view -j 1 "$(trex signal)" -o trex.png
     must_fail 2 vg-view --frames 3 cross.signal -o no.png
-    says "option '--frames' is about a sequence: of a signal the pose plane is drawn"
+    says "option '--frames' applies to a sequence: of a signal the pose plane is drawn"
     must_fail 2 vg-view cross.signal -o no.webp
     head -c -300 cross.signal >short.signal
     must_fail 3 vg-view short.signal -o no.png

@@ -132,8 +132,8 @@ END
         [ ! -e bad.vgs ] || fail "bad.vgs was left"
     }
     refused 'a - 0 0 0 1 1\n' "line 1: a bone is 'BONE PARENT HEAD_X"
-    refused 'a - 0 0 0 1 1 x\n' "line 1: 'x' is no number"
-    refused 'a - 0 0 0 1 1 nan\n' "line 1: 'nan' is no number"
+    refused 'a - 0 0 0 1 1 x\n' "line 1: 'x' is not a number"
+    refused 'a - 0 0 0 1 1 nan\n' "line 1: 'nan' is not a number"
     refused 'a b 0 0 0 1 1 1\n' "line 1: the parent 'b' of 'a' is not defined"
     refused 'a - 0 0 0 1 1 1\na - 0 0 0 1 1 1\n' "line 2: 'a' is already defined, in line 1"
     refused 'a b 0 0 0 1 1 1\nb a 0 0 0 1 1 1\n' 'has a cycle of joints'
@@ -153,11 +153,11 @@ END
     moved '0 a 0 0 0\n0 b 0 0 1\n0 c 0 0 1\n' "line 3: the skeleton has no joint 'c'"
     moved '0 a 0 0 0\n0 b 0 0 1\n0 a 0 0 1\n' "line 3: joint 'a' is already defined"
     moved '0 a 0 0 0\n0 b 0 0 1\n1 a 0 0 1\n' "has no joint 'b' in frame 1"
-    moved '0 a 0 0 0\n0 b 0 0 1\n1 a.end 0 0 1\n' "line 3: joint 'a.end' is not in the frames before"
+    moved '0 a 0 0 0\n0 b 0 0 1\n1 a.end 0 0 1\n' "line 3: joint 'a.end' is not in earlier frames"
     moved '1 a 0 0 0\n1 b 0 0 1\n0 a 0 0 1\n' 'line 3: frame 0 comes after frame 1'
     moved '0 a 0 0 0\nx b 0 0 1\n' "line 2: a joint is 'FRAME BONE X Y Z'"
     moved '0 a 0 0 0\n0 b 0 0\n' "line 2: a joint is 'FRAME BONE X Y Z'"
-    moved '0 a 0 0 0\n0 b 0 0 1e400\n' "'1e400' is no number"
+    moved '0 a 0 0 0\n0 b 0 0 1e400\n' "'1e400' is not a number"
     moved '# nothing\n' 'holds no frame'
     must_fail 3 vg-encode bad.joints.txt -o bad.vgs
     printf '0 a 0 0 0\n0 b 0 1 0\n' >good.joints.txt

@@ -173,7 +173,7 @@ END
     must_fail 2 vg-smooth --filter together --frames 3 p.vgs -o out.vgs
     must_fail 2 vg-smooth --memory 1M p.vgs -o out.vgs
     must_fail 2 vg-smooth --frames 0.5 p.vgs -o out.vgs
-    [[ $stderr = *'more than 1 frame'* ]] || fail "$stderr"
+    [[ $stderr = *'above 1 frame'* ]] || fail "$stderr"
     must_fail 2 vg-smooth --filter robust --frames 200 p.vgs -o out.vgs
     must_fail 3 vg-smooth v.vgs -o out.vgs
     must_fail 3 vg-smooth --filter together p.vgs -o out.vgs

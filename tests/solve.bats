@@ -167,7 +167,7 @@ assert 0 < a < 0.97 * s, (a, s)
 END
     pipe "vg-encode '$DATA/faceA.tar.xz' | vg-deform --onto '$DATA/faceB.tar.xz' -o vectors.vgs"
     vg-solve --rounds 1 vectors.vgs -o out.vgs 2>err
-    grep -q 'poses are not at their least misfit: in the last of 1 rounds' err
+    grep -q 'poses have not converged: in the last of 1 rounds' err
     vg-solve -q --rounds 1 vectors.vgs -o out.vgs 2>err
     [ ! -s err ]
     must_fail 2 vg-solve --rounds 0 vectors.vgs

@@ -36,7 +36,7 @@ horse() { echo "$BATS_FILE_TMPDIR/horse.$1"; }
     must vg-train $small --model pca --resume half.net --log long.tsv "$(horse vgs)" -o resumed.net
     must cmp log.tsv long.tsv
     must_fail 3 vg-train $small --model pca --seed 9 --resume half.net "$(horse vgs)" -o no.net
-    says "cannot go on from 'half.net': it was trained with other options"
+    says "cannot resume from 'half.net': it was trained with other options"
     must_fail 3 vg-train $small --model pca --resume whole.net "$(horse vgs)" -o no.net
     says "its training has ended"
     [ ! -e no.net ]
@@ -61,11 +61,11 @@ END
     must_fail 3 vg-generate --between 4 "$(horse net)" "$DATA/horse.rest.obj" -o no.vgs
     says "--between needs at least two keys, the input has 1"
     run vg-generate -v --between 4 --optimise "$(horse net)" keys.vgs -o no.vgs
-    grep -q "to key 3: after [0-9]* rounds of search the way .*missed it by" <<<"$output" || fail "$output"
+    grep -q "to key 3: after [0-9]* rounds of optimisation the run .*missed it by" <<<"$output" || fail "$output"
     must_fail 2 vg-generate --optimise "$(horse net)" keys.vgs -o no2.vgs
     must_fail 2 vg-generate --between 4 --merge 5% --optimise "$(horse net)" keys.vgs -o no2.vgs
     must_fail 2 vg-generate --between 4 --merge 200% "$(horse net)" keys.vgs -o no2.vgs
-    says "needs a share of the training's range such as 5%"
+    says "needs a share of the training range such as 5%"
 }
 
 @test "a search ends nearer to the key than the plain way" {
@@ -217,7 +217,7 @@ END
     must_fail 2 vg-view "$(horse vgs)" -o no.svg
     says "an SVG is made of the curves of a network"
     must_fail 2 vg-view --zoom 2 whole.net -o no.png
-    says "option '--zoom' is about a sequence: of a network its curves are drawn"
+    says "option '--zoom' applies to a sequence: of a network its curves are drawn"
     [ ! -e no.svg ] && [ ! -e no.png ]
 }
 
@@ -295,7 +295,7 @@ END
     cp there.net before.net
     must_fail 4 vg-train $small --model pca --iterations 5 --log /dev/full "$(horse vgs)" -o there.net
     must_fail 3 vg-train $small --model pca --iterations 5 --loss l2=1e38 "$(horse vgs)" -o there.net
-    says "the numbers run away at iteration 0: choose a smaller --rate"
+    says "training diverges at iteration 0: choose a smaller --rate"
     must_fail 2 vg-train $small --checkpoint there.net "$(horse vgs)" -o there.net
     says "'there.net' would be written twice"
     must cmp there.net before.net

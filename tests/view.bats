@@ -329,7 +329,7 @@ PY
     # frames without numbers among those with them, or with others, have no colour to say so
     must vg-encode near.vgs truth -o mixed.vgs
     must_fail 3 vg-view mixed.vgs -o mixed.png
-    says "brings no 'error' to be coloured"
+    says "has no 'error' to colour"
     must vg-diff -c truth off --heat centred.vgs -o report
     must_fail 3 vg-view off.vgs --beside centred.vgs -o mixed.png
     says "brings 'centred error' in 'D'"
@@ -514,6 +514,6 @@ END
     must_fail 2 vg-view --look-at 99999 tag-0.obj -o far.png
     says 'there is no vertex 99999: it has 915'
     must_fail 2 vg-view --look-at 1 tag-0.obj -o page.html
-    says "'--look-at' is about a sheet"
+    says "'--look-at' applies to a sheet"
     must_fail 2 vg-view --look-at 1 --fit path tag-0.obj -o p.png
 }

@@ -71,7 +71,7 @@ def open_input(path) -> None:
     if kind != '.blend' and kind not in importers:
         raise Trouble(f"cannot read '{path}': known are .blend, {', '.join(sorted(importers))}", USAGE)
     with open(path, 'rb'):
-        pass  # Blender's own words for a file that is not there are many
+        pass  # Blender's own words for a file that does not exist are many
     try:
         if kind == '.blend':
             bpy.ops.wm.open_mainfile(filepath=path, load_ui=False)

@@ -156,7 +156,7 @@ function readForm(stream, payload) {
 // Uint8Array -> { records, form, element, width, count, precision, frames, tail }
 export function read(bytes) {
     if (!bytes.length) throw new StreamError('no bytes: has the program before failed?');
-    if (bytes.length < 16 || MAGIC.some((b, i) => bytes[i] !== b) || bytes.subarray(12, 16).some((b) => b)) throw new StreamError('this is no vg stream of version 1');
+    if (bytes.length < 16 || MAGIC.some((b, i) => bytes[i] !== b) || bytes.subarray(12, 16).some((b) => b)) throw new StreamError('this is not a vg stream of version 1');
     const stream = { records: [], form: null, frames: [], tail: [] }, sums = new Bytes();
     let at = 16, index = 0, extra = [];
     for (;;) {

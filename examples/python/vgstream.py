@@ -328,7 +328,7 @@ class Reader(Head):
     def _read_head(self):
         magic = self._exactly(16)
         if magic[:8] != MAGIC or any(magic[12:]):
-            self._fail("this is no vg stream of version 1")
+            self._fail("this is not a vg stream of version 1")
         records = []
         while True:
             record = self._record()

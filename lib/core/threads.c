@@ -50,7 +50,7 @@ static void join_loop(void)
 }
 
 /* Process the next item of a belt that has not started. */
-static void advance(vgi_belt *b)
+static void process_next(vgi_belt *b)
 {
     size_t place = (b->first + b->begun++) % b->places;
     b->working++;
@@ -80,7 +80,7 @@ static void *work(void *arg)
             seen = pool.loop;
             join_loop();
         } else if ((b = waiting_belt())) {
-            advance(b);
+            process_next(b);
         } else {
             pthread_cond_wait(&pool.start, &pool.lock);
         }
@@ -201,7 +201,7 @@ size_t vgi_belt_take(vgi_belt *b)
     pthread_mutex_lock(&pool.lock);
     size_t place = b->first;
     while (!b->done[place]) {
-        if (b->begun < b->n) advance(b);
+        if (b->begun < b->n) process_next(b);
         else pthread_cond_wait(&pool.done, &pool.lock);
     }
     b->done[place] = false;

@@ -308,7 +308,7 @@ static int add_member(vgi_archive *a, vg_err *e)
 int vgi_unknown_kind(const char *name, vg_err *e)
 {
     return vg_fail(e, VG_EINPUT,
-                   "cannot tell what '%s' is: no stream, no archive, none of %s; export other kinds as one of them",
+                   "cannot tell what '%s' is: not a stream, not an archive, none of %s; export it as one of these",
                    name, vgi_kinds_read());
 }
 
@@ -353,7 +353,7 @@ static int list_members(vgi_archive *a, vg_err *e)
     }
     if (r == VG_OK) r = a->packed ? check_packed_end(a, e) : check_tar_end(a, e);
     if (r == VG_OK && a->n == 0 && a->wanted != is_mesh_name)
-        r = vg_fail(e, VG_EINPUT, "archive '%s' holds none of the files it should", a->name);
+        r = vg_fail(e, VG_EINPUT, "archive '%s' holds none of the listed files", a->name);
     else if (r == VG_OK && a->n == 0)
         r = holds_no_mesh(a, e);
     if (r == VG_OK) prefer_poses(a);
@@ -402,7 +402,7 @@ static int unpack_all(vgi_archive *a, vg_err *e)
     return r;
 }
 
-static int prepare(vgi_archive *a, const char *name, vg_err *e)
+static int make_reader(vgi_archive *a, const char *name, vg_err *e)
 {
     struct stat st;
     unsigned char start[16];
@@ -430,7 +430,7 @@ int vgi_archive_open_for(vgi_archive **out, int fd, int64_t base, const char *na
     if (!a) return close(fd), VG_ENOMEM;
     a->wanted = wanted;
     a->limits = *limits, a->file.fd = fd, a->file.base = base, a->spool = -1;
-    int r = prepare(a, name, e);
+    int r = make_reader(a, name, e);
     if (r == VG_OK) r = list_members(a, e);
     if (r == VG_OK) r = in_order(a) ? walk_open(a, e) : unpack_all(a, e);
     if (r < 0) vgi_archive_close(out);
@@ -480,7 +480,7 @@ int vgi_unpack_stream(int fd, int64_t base, const char *name, const vgi_limits *
     a->limits = *limits, a->file.base = base, a->spool = -1;
     int r = a->file.fd = fcntl(fd, F_DUPFD_CLOEXEC, 3);
     if (r < 0) r = vg_fail(e, VG_ESYS, "cannot read '%s': %s", name, strerror(errno));
-    if (r >= 0) r = prepare(a, name, e);
+    if (r >= 0) r = make_reader(a, name, e);
     if (r == VG_OK && begins_like_stream(a)) {
         r = *stream = vgi_nameless_file(e);
         if (r >= 0) r = copy_unpacked(a, *stream, e);

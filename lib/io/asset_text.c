@@ -5,7 +5,7 @@
 
 #include <stdlib.h>
 
-static size_t count(const vgi_gltf *g, const char *list)
+static size_t count_items(const vgi_gltf *g, const char *list)
 {
     return vgi_json_count(vgi_json_get(g->json, list));
 }
@@ -23,7 +23,7 @@ static size_t having(const vgi_gltf *g, const char *attribute)
     return n;
 }
 
-static void say(char *to, size_t room, const char *text)
+static void append_text(char *to, size_t room, const char *text)
 {
     const size_t n = strlen(to);
     if (n < room) snprintf(to + n, room - n, "%s%s", n ? ", " : "", text);
@@ -33,7 +33,7 @@ static void say_count(char *to, size_t room, size_t n, const char *thing)
 {
     char text[60];
     snprintf(text, sizeof text, "%zu %s%s", n, thing, n == 1 ? "" : "s");
-    if (n) say(to, room, text);
+    if (n) append_text(to, room, text);
 }
 
 void vg_asset_text(const vg_asset *a, char *to, size_t room)
@@ -44,14 +44,14 @@ void vg_asset_text(const vg_asset *a, char *to, size_t room)
     int r = a->n ? vgi_input_memory(&in, a->data, a->size, "asset", NULL) : VG_EINPUT;
     if (r == VG_OK) r = vgi_gltf_open(&g, in, "the asset", NULL);
     if (r == VG_OK) {
-        say_count(to, room, count(&g, "materials"), "material");
-        say_count(to, room, count(&g, "images"), "texture");
-        if (having(&g, "NORMAL")) say(to, room, "normals");
-        if (having(&g, "TANGENT")) say(to, room, "tangents");
-        if (having(&g, "COLOR_0")) say(to, room, "colours of vertices");
-        if (having(&g, "TEXCOORD_1")) say(to, room, "further texture coordinates");
-        say_count(to, room, count(&g, "skins"), "skin");
-        say_count(to, room, count(&g, "cameras"), "camera");
+        say_count(to, room, count_items(&g, "materials"), "material");
+        say_count(to, room, count_items(&g, "images"), "texture");
+        if (having(&g, "NORMAL")) append_text(to, room, "normals");
+        if (having(&g, "TANGENT")) append_text(to, room, "tangents");
+        if (having(&g, "COLOR_0")) append_text(to, room, "colours of vertices");
+        if (having(&g, "TEXCOORD_1")) append_text(to, room, "further texture coordinates");
+        say_count(to, room, count_items(&g, "skins"), "skin");
+        say_count(to, room, count_items(&g, "cameras"), "camera");
     }
     vgi_input_free(&in);
     vgi_gltf_clear(&g);
@@ -86,7 +86,8 @@ int vg_asset_vertices(const vg_asset *a, vg_asset_take *take, void *context, vg_
     if (r == VG_OK) r = vgi_gltf_open(&x.g, in, "the asset", e);
     vgi_input_free(&in);
     if (r == VG_OK) r = vgi_gltf_scene_read(&x, &faces, e);
-    if (r == VG_OK && x.nparts && x.all != a->n) r = vg_fail(e, VG_EINPUT, "the asset has another number of vertices");
+    if (r == VG_OK && x.nparts && x.all != a->n) r = vg_fail(e, VG_EINPUT, "the asset has a different number of "
+                                                                           "vertices");
     for (size_t i = 0; r == VG_OK && i < x.nparts; i++) take_part(&x, i, a, take, context);
     vg_mesh_clear(&faces.mesh);
     vgi_gltf_scene_clear(&x);

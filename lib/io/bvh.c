@@ -298,7 +298,7 @@ static int read_motion_head(reading *b, vg_err *e)
                        b->frame_time > 0 ? "too large" : "not positive");
     /* a frame is at least one line; without channels nothing else would limit a false count */
     if (b->channels == 0 && b->frames > (uint64_t)(b->end - b->at))
-        return vg_fail(e, VG_ETRUNC, "%s has fewer than the %llu frames that it promises", b->subject,
+        return vg_fail(e, VG_ETRUNC, "%s has fewer than the %llu frames that it announces", b->subject,
                        (unsigned long long)b->frames);
     return VG_OK;
 }
@@ -349,10 +349,10 @@ static int check_rows(reading *b, vg_err *e)
     const uint64_t whole = k.values / width;
     const bool free_lines = k.values % width == 0 && whole == b->frames && k.lines != b->frames;
     if (k.wrong && !free_lines && !(k.aligned && (whole < b->frames || k.values % width == 0)))
-        return vg_fail(e, VG_EINPUT, "%s line %zu: a row of %zu values, and the channels are %zu", b->subject,
+        return vg_fail(e, VG_EINPUT, "%s line %zu: a row has %zu values, but there are %zu channels", b->subject,
                        line_of(b, k.wrong), k.has, width);
     if (whole <= b->frames) return VG_OK;
-    vgi_note(&b->note, "it announces %llu frames and holds %llu, which are read", (unsigned long long)b->frames,
+    vgi_note(&b->note, "it announces %llu frames but holds %llu, which are read", (unsigned long long)b->frames,
              (unsigned long long)whole);
     b->frames = whole;
     return VG_OK;
@@ -362,7 +362,7 @@ static int check_places(reading *b, const double *positions, const char *what, v
 {
     for (size_t j = 0; j < b->skeleton.njoints; j++)
         if (!vgi_finite(positions + 3 * j, 3))
-            return vg_fail(e, VG_EINPUT, "%s line %zu: %s, joint '%s' is at a position that no number can hold", b->subject,
+            return vg_fail(e, VG_EINPUT, "%s line %zu: %s, the position of joint '%s' is too large", b->subject,
                            line_of(b, b->at), what, b->skeleton.joints[j].name);
     return VG_OK;
 }
@@ -414,7 +414,7 @@ static int end_motion(reading *b, vg_err *e)
     char expected[64];
     skip_blanks(b);
     if (b->at == b->end) return 0;
-    snprintf(expected, sizeof expected, "the end of the file behind %llu frames", (unsigned long long)b->frames);
+    snprintf(expected, sizeof expected, "the end of the file after %llu frames", (unsigned long long)b->frames);
     return fail_here(b, expected, e);
 }
 
@@ -424,7 +424,7 @@ static int read_row(reading *b, vg_err *e)
     for (size_t i = 0; i < b->kept.size; i++) {
         skip_blanks(b);
         if (b->at == b->end)
-            return vg_fail(e, VG_ETRUNC, "%s ends in frame %llu of %llu, behind %zu of %zu values", b->subject,
+            return vg_fail(e, VG_ETRUNC, "%s ends in frame %llu of %llu, after %zu of %zu values", b->subject,
                            (unsigned long long)b->next, (unsigned long long)b->frames, i, b->kept.size);
         int r = take_number(b, "a number", b->kept.data[i] ? to++ : &scale, e);
         if (r < 0) return r;

@@ -39,7 +39,7 @@ typedef struct writing {
     char warning[400];
 } writing;
 
-static int say(vg_bytes *b, const char *s, vg_err *e)
+static int put_string(vg_bytes *b, const char *s, vg_err *e)
 {
     return vgi_bytes_append(b, s, strlen(s), e);
 }
@@ -125,7 +125,7 @@ static void take_offsets(vg_skeleton *s, const double *reference)
 int vgi_bvh_check(const vg_head *h, const char *output, vg_err *e)
 {
     if (h->body.mesh.nv && h->body.skeleton.njoints == h->body.mesh.nv) return VG_OK;
-    return vg_fail(e, VG_EINPUT, "cannot write '%s': the input holds no skeleton, as a sequence read from BVH does",
+    return vg_fail(e, VG_EINPUT, "cannot write '%s': the input has no skeleton",
                    output);
 }
 
@@ -164,12 +164,12 @@ static int say_row(writing *w, vg_err *e)
         const vg_joint *j = &w->skeleton.joints[w->order[i]];
         const double *values = w->values + w->first_value[w->order[i]];
         for (uint32_t c = 0; r == VG_OK && c < j->nchannels; c++, any = true) {
-            if (any) r = say(&w->text, " ", e);
+            if (any) r = put_string(&w->text, " ", e);
             if (r == VG_OK)
                 r = say_fixed(&w->text, values[c], j->channels[c] > 3 ? w->angle_decimals : w->place_decimals, e);
         }
     }
-    return r < 0 ? r : say(&w->text, "\n", e);
+    return r < 0 ? r : put_string(&w->text, "\n", e);
 }
 
 /* ---- file header ---- */
@@ -177,7 +177,7 @@ static int say_row(writing *w, vg_err *e)
 static int say_tabs(vg_bytes *b, size_t depth, vg_err *e)
 {
     int r = VG_OK;
-    for (size_t i = 0; r == VG_OK && i < depth && i < MOST_TABS; i++) r = say(b, "\t", e);
+    for (size_t i = 0; r == VG_OK && i < depth && i < MOST_TABS; i++) r = put_string(b, "\t", e);
     return r;
 }
 
@@ -185,7 +185,7 @@ static int say_tabs(vg_bytes *b, size_t depth, vg_err *e)
 static int say_name(vg_bytes *b, const char *name, vg_err *e)
 {
     size_t from = b->size;
-    int r = say(b, name, e);
+    int r = put_string(b, name, e);
     for (size_t i = from; r == VG_OK && i < b->size; i++)
         if (b->data[i] < 0x20 || b->data[i] == 0x7f || b->data[i] == '{' || b->data[i] == '}') b->data[i] = '_';
     return r;
@@ -214,14 +214,14 @@ static int check_names(const writing *w, vg_err *e)
 static int say_opening(writing *w, vg_bytes *b, uint32_t j, size_t depth, vg_err *e)
 {
     int r = say_tabs(b, depth, e);
-    if (r == VG_OK && is_end_site(w, j)) r = say(b, "End Site", e);
+    if (r == VG_OK && is_end_site(w, j)) r = put_string(b, "End Site", e);
     else if (r == VG_OK) {
-        r = say(b, w->skeleton.joints[j].parent == NONE ? "ROOT " : "JOINT ", e);
+        r = put_string(b, w->skeleton.joints[j].parent == NONE ? "ROOT " : "JOINT ", e);
         if (r == VG_OK) r = say_name(b, w->skeleton.joints[j].name, e);
     }
-    if (r == VG_OK) r = say(b, "\n", e);
+    if (r == VG_OK) r = put_string(b, "\n", e);
     if (r == VG_OK) r = say_tabs(b, depth, e);
-    return r < 0 ? r : say(b, "{\n", e);
+    return r < 0 ? r : put_string(b, "{\n", e);
 }
 
 static int say_joint(writing *w, vg_bytes *b, uint32_t j, size_t depth, vg_err *e)
@@ -229,33 +229,33 @@ static int say_joint(writing *w, vg_bytes *b, uint32_t j, size_t depth, vg_err *
     const vg_joint *joint = &w->skeleton.joints[j];
     int r = say_opening(w, b, j, depth, e);
     if (r == VG_OK) r = say_tabs(b, depth + 1, e);
-    if (r == VG_OK) r = say(b, "OFFSET", e);
+    if (r == VG_OK) r = put_string(b, "OFFSET", e);
     for (int k = 0; r == VG_OK && k < 3; k++) {
-        r = say(b, " ", e);
+        r = put_string(b, " ", e);
         if (r == VG_OK) r = say_fixed(b, joint->offset[k], w->place_decimals, e);
     }
-    if (r == VG_OK) r = say(b, "\n", e);
+    if (r == VG_OK) r = put_string(b, "\n", e);
     if (r < 0 || is_end_site(w, j)) return r;
     char count[24];
     r = say_tabs(b, depth + 1, e);
-    if (r == VG_OK) r = say(b, "CHANNELS ", e);
+    if (r == VG_OK) r = put_string(b, "CHANNELS ", e);
     if (r == VG_OK) r = vgi_bytes_append(b, count, vgi_print_uint(count, joint->nchannels), e);
     for (uint32_t c = 0; r == VG_OK && c < joint->nchannels; c++) {
-        r = say(b, " ", e);
-        if (r == VG_OK) r = say(b, vgi_bvh_channels[joint->channels[c] - 1], e);
+        r = put_string(b, " ", e);
+        if (r == VG_OK) r = put_string(b, vgi_bvh_channels[joint->channels[c] - 1], e);
     }
-    return r < 0 ? r : say(b, "\n", e);
+    return r < 0 ? r : put_string(b, "\n", e);
 }
 
 static int say_hierarchy(writing *w, vg_bytes *b, vg_err *e)
 {
     size_t depth = 0, closed;
-    int r = say(b, "HIERARCHY\n", e);
+    int r = put_string(b, "HIERARCHY\n", e);
     for (uint32_t j = w->kin.first[w->skeleton.njoints]; r == VG_OK && j != NONE;) {
         r = say_joint(w, b, j, depth++, e);
         for (j = step_on(w, j, &closed); r == VG_OK && closed > 0; closed--) {
             r = say_tabs(b, --depth, e);
-            if (r == VG_OK) r = say(b, "}\n", e);
+            if (r == VG_OK) r = put_string(b, "}\n", e);
         }
     }
     return r;
@@ -281,9 +281,9 @@ static int put_text(writing *w, vg_err *e)
 static int put_head(writing *w, vg_err *e)
 {
     int r = say_hierarchy(w, &w->text, e);
-    if (r == VG_OK) r = say(&w->text, "MOTION\nFrames: ", e);
+    if (r == VG_OK) r = put_string(&w->text, "MOTION\nFrames: ", e);
     if (r == VG_OK) r = say_field(&w->text, &w->frames_at, e);
-    if (r == VG_OK) r = say(&w->text, "Frame Time: ", e);
+    if (r == VG_OK) r = put_string(&w->text, "Frame Time: ", e);
     if (r == VG_OK) r = say_field(&w->text, &w->time_at, e);
     w->frames_at += w->out->size, w->time_at += w->out->size;
     return r < 0 ? r : put_text(w, e);
@@ -359,12 +359,12 @@ const char *vgi_bvh_warning(void *state)
     w->warning[0] = 0;
     if (w->worst > 1e-4 * w->size)
         n = (size_t)snprintf(w->warning, room,
-                             "the lengths of the bones as they change: joint '%.100s' of frame '%.100s' is off by "
-                             "%.3g, %.2g %% of the figure",
+                             "changes of the lengths of bones: joint '%.100s' of frame '%.100s' is off by %.3g, %.2g "
+                             "%% of the figure",
                              w->skeleton.joints[w->worst_joint].name, w->worst_frame, w->worst,
                              w->size > 0 ? 100 * w->worst / w->size : 100);
     if (w->uneven)
-        snprintf(w->warning + n, room - n, "%sthe times of the frames: they are not at equal distances",
+        snprintf(w->warning + n, room - n, "%sthe times of the frames, which are not evenly spaced",
                  n ? "; " : "");
     return w->warning[0] ? w->warning : NULL;
 }

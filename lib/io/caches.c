@@ -16,25 +16,25 @@ static const char pc2_magic[12] = "POINTCACHE2";
 
 /* MDD has a time for every sample: the interval for sequences without times. */
 
-static uint32_t load(const unsigned char *p, bool big)
+static uint32_t load_u32(const unsigned char *p, bool big)
 {
     uint32_t x = vgi_get32(p);
     return big ? __builtin_bswap32(x) : x;
 }
 
-static void store(unsigned char *p, uint32_t x, bool big)
+static void store_u32(unsigned char *p, uint32_t x, bool big)
 {
     vgi_put32(p, big ? __builtin_bswap32(x) : x);
 }
 
 static float load_float(const unsigned char *p, bool big)
 {
-    return vgi_as_float(load(p, big));
+    return vgi_as_float(load_u32(p, big));
 }
 
 static void store_float(unsigned char *p, float x, bool big)
 {
-    store(p, vgi_float_bits(x), big);
+    store_u32(p, vgi_float_bits(x), big);
 }
 
 /* ------------------------------------------------------------------------------------------- reading -- */
@@ -56,7 +56,7 @@ static int cut_short(const reading *x, int r, const char *where, vg_err *e)
     return r == VG_ETRUNC ? vg_fail(e, r, "%s ends too early: %s", x->subject, where) : r;
 }
 
-static int take(reading *x, vg_bytes *to, size_t n, const char *where, vg_err *e)
+static int read_bytes(reading *x, vg_bytes *to, size_t n, const char *where, vg_err *e)
 {
     to->size = 0;
     int r = vgi_input_take(x->in, to, n, NULL, e);
@@ -67,13 +67,13 @@ static int take_sample(reading *x, vg_err *e)
 {
     char where[64];
     snprintf(where, sizeof where, "in sample %u of %u", x->next + 1, x->samples);
-    int r = take(x, &x->ahead, (size_t)x->points * POINT, where, e);
+    int r = read_bytes(x, &x->ahead, (size_t)x->points * POINT, where, e);
     x->have_ahead = r == VG_OK;
     return r;
 }
 
 /* Returns 0 (end of sequence) if the file ends, too. */
-static int finish(reading *x, vg_err *e)
+static int finish_samples(reading *x, vg_err *e)
 {
     int r = vgi_input_ended(x->in, e);
     if (r != 0) return r < 0 ? r : 0;
@@ -124,9 +124,9 @@ static int open_pc2(void **state, vg_head *h, vgi_input *in, const vg_reading *h
     if (r == VG_OK) r = cut_short(x, vgi_input_read(in, head, sizeof head, NULL, e), "in its header", e);
     if (r < 0) return r;
     if (memcmp(head, pc2_magic, sizeof pc2_magic) != 0)
-        return vg_fail(e, VG_EINPUT, "%s is no PC2 cache: it does not begin with POINTCACHE2", subject);
+        return vg_fail(e, VG_EINPUT, "%s is not a PC2 cache: it does not begin with POINTCACHE2", subject);
     if (vgi_get32(head + 12) != 1)
-        return vg_fail(e, VG_EINPUT, "%s is a PC2 cache of version %d: only version 1 is known", subject,
+        return vg_fail(e, VG_EINPUT, "%s is a PC2 cache of version %d: only version 1 is supported", subject,
                        (int32_t)vgi_get32(head + 12));
     x->points = vgi_get32(head + 16), x->samples = vgi_get32(head + PC2_SAMPLES_OFF);
     x->start = load_float(head + PC2_RATE_OFF, false), x->rate = load_float(head + PC2_RATE_OFF + 4, false);
@@ -146,9 +146,9 @@ static int open_mdd(void **state, vg_head *h, vgi_input *in, const vg_reading *h
     int r = begin_reading(&x, state, in, subject, true, e);
     if (r == VG_OK) r = cut_short(x, vgi_input_read(in, head, sizeof head, NULL, e), "in its header", e);
     if (r < 0) return r;
-    x->samples = load(head, true), x->points = load(head + 4, true);
+    x->samples = load_u32(head, true), x->points = load_u32(head + 4, true);
     if ((r = check_counts(x, e)) < 0) return r;
-    if ((r = take(x, &x->times, (size_t)x->samples * 4, "in the times of its samples", e)) < 0) return r;
+    if ((r = read_bytes(x, &x->times, (size_t)x->samples * 4, "in the times of its samples", e)) < 0) return r;
     x->timed = true;
     for (uint32_t i = 0; i < x->samples; i++)
         if (!isfinite(load_float(x->times.data + 4 * (size_t)i, true)))
@@ -166,7 +166,7 @@ static int next_sample(void *state, vg_frame *f, vg_err *e)
 {
     reading *x = state;
     int r;
-    if (x->next == x->samples) return finish(x, e);
+    if (x->next == x->samples) return finish_samples(x, e);
     if (!x->have_ahead && (r = take_sample(x, e)) < 0) return r;
     const unsigned char *p = x->ahead.data;
     for (size_t i = 0; i < 3 * (size_t)x->points; i++, p += 4) f->values[i] = load_float(p, x->big);
@@ -316,8 +316,8 @@ static int end_mdd(void *state, vg_err *e)
 {
     unsigned char head[MDD_HEADER];
     writing *x = state;
-    store(head, x->samples, true);
-    store(head + 4, (uint32_t)x->points, true);
+    store_u32(head, x->samples, true);
+    store_u32(head + 4, (uint32_t)x->points, true);
     int r = vgi_output_put(x->out, head, sizeof head, e);
     if (r == VG_OK) r = vgi_output_put(x->out, x->times.data, x->times.size, e);
     if (r == VG_OK) r = vgi_output_flush(&x->spool, e);
@@ -327,7 +327,7 @@ static int end_mdd(void *state, vg_err *e)
 static const char *warn_pc2(void *state)
 {
     const writing *x = state;
-    return !x->untimed && x->uneven ? "the times of the frames: they are not at equal distances" : NULL;
+    return !x->untimed && x->uneven ? "the times of the frames, which are not evenly spaced" : NULL;
 }
 
 static void release_cache(void *state)

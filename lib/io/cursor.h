@@ -157,7 +157,7 @@ static inline const char *peek_text(cursor *c, size_t *n, const vgi_payload *p, 
     const char *s = (const char *)take_array(c, length, 1);
     *n = (size_t)length;
     if (!s) *r = wrong(p, "a text is longer than its record", e);
-    else if (!vgi_is_utf8(s, *n)) *r = wrong(p, "a text is no UTF-8", e);
+    else if (!vgi_is_utf8(s, *n)) *r = wrong(p, "a text is not UTF-8", e);
     else if (!take_padding(c, -length & 7)) *r = wrong(p, "padding is missing or not zero", e);
     else return s;
     return NULL;

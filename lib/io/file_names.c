@@ -25,7 +25,7 @@ static bool is_file_name(const char *name)
 }
 
 /* Remember `file` as the last one; false if it does not sort after the previous one. */
-static int follow(vgi_file_names *t, const char *file, bool *follows, vg_err *e)
+static int check_order(vgi_file_names *t, const char *file, bool *follows, vg_err *e)
 {
     *follows = !t->last.size || vgi_natural_compare((char *)t->last.data, file) < 0;
     t->last.size = 0;
@@ -40,7 +40,7 @@ int vgi_file_names_next(vgi_file_names *t, const char *name, const char *suffix,
     if (r == VG_OK && !t->numbered && is_file_name(name)) {
         r = vgi_bytes_append(&t->file, name, strlen(name), e);
         if (r == VG_OK) r = vgi_bytes_append(&t->file, suffix, strlen(suffix) + 1, e);
-        if (r == VG_OK) r = follow(t, (char *)t->file.data, &follows, e);
+        if (r == VG_OK) r = check_order(t, (char *)t->file.data, &follows, e);
     }
     if (r < 0 || follows) return r;
     bool begins = !t->numbered;
@@ -53,17 +53,18 @@ int vgi_file_names_next(vgi_file_names *t, const char *name, const char *suffix,
 int vgi_file_names_series(vgi_file_names *t, const char *path, vg_err *e)
 {
     bool follows;
-    int r = follow(t, path, &follows, e);
+    int r = check_order(t, path, &follows, e);
     if (r < 0 || follows) return r;
     return vg_fail(e, VG_EARG,
-                   "'%s' would be read before the file of the frame before it: digits behind a point are decimals, "
-                   "those behind '_-' are negative: choose another pattern",
+                   "'%s' would sort before the file of the previous frame (digits after a point are decimals, those "
+                   "after '_-' are negative): choose another pattern",
                    path);
 }
 
 int vgi_file_names_warn(const vgi_file_names *t, const char *suffix, vgi_names *warnings, vg_err *e)
 {
-    static const char text[] = "the names of the frames do not sort in their order: files have a number in front, such as '";
+    static const char text[] = "the names of the frames do not sort in frame order: files get a number as prefix, "
+                               "such as '";
     vg_bytes file = {0}, line = {0};
     if (!t->numbered) return VG_OK;
     int r = vgi_file_name_numbered(&file, t->first_numbered, t->frames.at[t->first_numbered], suffix, e);

@@ -59,7 +59,7 @@ static int read_plain(vg_model *m, const void *data, size_t n, const vgi_format 
     if (n == 0) return vg_fail(e, VG_ETRUNC, "%s is empty", subject);
     if (!format) format = vgi_format_by_content(data, n);
     if (!format) format = vgi_format_by_suffix(file_name);
-    if (!format) return vg_fail(e, VG_EINPUT, "%s is no mesh file (read: OBJ, PLY, OFF, STL)", subject);
+    if (!format) return vg_fail(e, VG_EINPUT, "%s is not a mesh file (read: OBJ, PLY, OFF, STL)", subject);
     int r = format->read(m, data, n, subject, e);
     if (r == VG_OK) r = vgi_mend_faces(&m->mesh, m->vertices, &m->attributes, &m->note, subject, e);
     if (r < 0) vg_model_clear(m);

@@ -77,7 +77,7 @@ static const char *refuse_meaning(const taken *t, vg_element element, const vgi_
     if (meaning == MEANINGS) return NULL;
     if (meanings[meaning].element != element || meanings[meaning].width != t->width)
         return "its elements or their width are not those of its name";
-    return goes_with(meaning, h) ? NULL : "it does not go with these frames";
+    return goes_with(meaning, h) ? NULL : "it does not belong to these frames";
 }
 
 static const char *refuse_channel(const taken *t, vg_element element, const vgi_form *h)
@@ -112,7 +112,8 @@ static int take_numbers(cursor *c, vg_frame *f, const vgi_form *h, const taken *
     if (t->type == VG_F64) copy_doubles(to, data, n);
     else copy_floats(to, data, n);
     if (!vgi_finite(to, n)) return wrong_channel(p, t, "a number is not finite", e);
-    return meaning != TURNS || vgi_are_turns(to, n / 4) ? VG_OK : wrong_channel(p, t, "a turn is no unit quaternion", e);
+    return meaning != TURNS || vgi_are_turns(to, n / 4) ? VG_OK : wrong_channel(p, t, "a turn is not a unit "
+                                                                                      "quaternion", e);
 }
 
 static int take_channel(cursor *c, vg_frame *f, const vgi_form *h, bool *seen, const vgi_payload *p, vg_err *e)
@@ -262,7 +263,7 @@ static int check_channel(const vg_channel *c, const vgi_form *h, const char *nam
     if (c->vertices) return vgi_check_ascending(where, c->vertices, c->count, h->elements[VG_OF_VERTEX], e);
     if (!vgi_finite(c->numbers, c->width * c->count)) return vgi_wrong(where, "a number is not finite", e);
     if (!strcmp(c->name, "turns") && !vgi_are_turns(c->numbers, c->count))
-        return vgi_wrong(where, "a turn is no unit quaternion", e);
+        return vgi_wrong(where, "a turn is not a unit quaternion", e);
     return VG_OK;
 }
 
@@ -274,7 +275,7 @@ static int check_frame(const vgi_form *h, const vg_frame *f, const char *name, u
     if ((f->has_time && !vgi_finite(&f->time, 1)) || (h->on_corners && !vgi_finite(f->root, 3)))
         return vg_fail(e, VG_EINPUT, "frame '%s' has a time or root that is not finite", name);
     if (has_zero_quaternion(h, f->values))
-        return vg_fail(e, VG_EINPUT, "frame '%s' shrinks something to nothing: a quaternion is zero", name);
+        return vg_fail(e, VG_EINPUT, "frame '%s' has a quaternion that is zero", name);
     for (size_t i = 0; r == VG_OK && i < f->nchannels; i++)
         if (is_written(&f->channels[i], h)) (*written)++, r = check_channel(&f->channels[i], h, name, e);
     if (r == VG_OK && *written > MOST_CHANNELS)

@@ -14,7 +14,7 @@ int vgi_packing_make(vgi_packing *p, const vg_head *h, bool values, vg_err *e)
     return vg_fail(e, VG_ENOMEM, "not enough memory for a frame of %zu elements", h->count);
 }
 
-static bool add(size_t *sum, size_t n, size_t size)
+static bool add_size(size_t *sum, size_t n, size_t size)
 {
     size_t bytes;
     return vgi_mul(n, size, &bytes) && !__builtin_add_overflow(*sum, bytes, sum);
@@ -49,18 +49,18 @@ int vgi_pack_measure(const vgi_packing *s, const vg_frame *f, vgi_packed *to, vg
                        .time = f->time,
                        .has_time = f->has_time,
                        .root = {f->root[0], f->root[1], f->root[2]}};
-    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, s->values, sizeof(double));
+    bool ok = add_size(&to->bytes, to->name, 1) && add_size(&to->bytes, s->values, sizeof(double));
     for (size_t i = 0; ok && i < f->nchannels; i++) {
         channel_front c = front_of(&f->channels[i]);
-        ok = add(&to->bytes, 1, sizeof c) && add(&to->bytes, c.name, 1) && add(&to->bytes, c.unit, 1) &&
-             add(&to->bytes, c.element, 1) && add(&to->bytes, data_of(&c), 1);
+        ok = add_size(&to->bytes, 1, sizeof c) && add_size(&to->bytes, c.name, 1) && add_size(&to->bytes, c.unit, 1) &&
+             add_size(&to->bytes, c.element, 1) && add_size(&to->bytes, data_of(&c), 1);
     }
     for (size_t i = 0; ok && i < f->extra.n; i++)
-        ok = add(&to->bytes, 1, sizeof(vg_record)) && add(&to->bytes, f->extra.at[i].payload.size, 1);
+        ok = add_size(&to->bytes, 1, sizeof(vg_record)) && add_size(&to->bytes, f->extra.at[i].payload.size, 1);
     return ok ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to hold frame '%s'", f->name);
 }
 
-static unsigned char *append(unsigned char *to, const void *from, size_t n)
+static unsigned char *append_bytes(unsigned char *to, const void *from, size_t n)
 {
     if (n) memcpy(to, from, n);
     return to + n;
@@ -69,26 +69,26 @@ static unsigned char *append(unsigned char *to, const void *from, size_t n)
 static unsigned char *pack_channel(const vg_channel *c, unsigned char *to)
 {
     channel_front head = front_of(c);
-    to = append(to, &head, sizeof head);
-    to = append(to, c->name, head.name);
-    to = append(to, c->unit, head.unit);
-    to = append(to, c->element_name, head.element);
-    return append(to, head.list ? (const void *)c->vertices : c->numbers, data_of(&head));
+    to = append_bytes(to, &head, sizeof head);
+    to = append_bytes(to, c->name, head.name);
+    to = append_bytes(to, c->unit, head.unit);
+    to = append_bytes(to, c->element_name, head.element);
+    return append_bytes(to, head.list ? (const void *)c->vertices : c->numbers, data_of(&head));
 }
 
 void vgi_pack(const vgi_packing *s, const vg_frame *f, const vgi_packed *head, unsigned char *to)
 {
-    to = append(to, head, sizeof *head);
-    to = append(to, f->name, head->name);
+    to = append_bytes(to, head, sizeof *head);
+    to = append_bytes(to, f->name, head->name);
     for (size_t i = 0; i < head->records; i++) {
-        to = append(to, &f->extra.at[i], sizeof f->extra.at[i]);
-        to = append(to, f->extra.at[i].payload.data, f->extra.at[i].payload.size);
+        to = append_bytes(to, &f->extra.at[i], sizeof f->extra.at[i]);
+        to = append_bytes(to, f->extra.at[i].payload.data, f->extra.at[i].payload.size);
     }
     for (size_t i = 0; i < head->channels; i++) to = pack_channel(&f->channels[i], to);
-    append(to, f->values, s->values * sizeof *f->values);
+    append_bytes(to, f->values, s->values * sizeof *f->values);
 }
 
-static const unsigned char *take(const unsigned char *from, void *to, size_t n)
+static const unsigned char *take_bytes(const unsigned char *from, void *to, size_t n)
 {
     if (n) memcpy(to, from, n);
     return from + n;
@@ -100,7 +100,7 @@ static const unsigned char *unpack_records(const unsigned char *from, size_t n, 
     if (n && !(to->at = vgi_array(n, sizeof *to->at, e))) return NULL;
     for (; to->n < n; to->n++) {
         vg_record *r = &to->at[to->n];
-        from = take(from, r, sizeof *r);
+        from = take_bytes(from, r, sizeof *r);
         size_t size = r->payload.size;
         r->payload = (vg_bytes){0};
         if (vgi_bytes_append(&r->payload, from, size, e) < 0) return vg_records_clear(to), NULL;
@@ -113,19 +113,19 @@ static const unsigned char *unpack_channel(const unsigned char *from, vg_frame *
 {
     channel_front head;
     vg_channel *c;
-    from = take(from, &head, sizeof head);
+    from = take_bytes(from, &head, sizeof head);
     vgi_channel_texts t = {.name_bytes = head.name, .unit_bytes = head.unit, .element_bytes = head.element};
     t.name = (const char *)from, t.unit = t.name + head.name, t.element = t.unit + head.unit;
     if (vgi_frame_add(f, &t, head.width, head.count, &c, e) < 0) return NULL;
     c->precision = head.precision;
     from += head.name + head.unit + head.element;
-    return take(from, head.list ? (void *)c->vertices : c->numbers, data_of(&head));
+    return take_bytes(from, head.list ? (void *)c->vertices : c->numbers, data_of(&head));
 }
 
 int vgi_unpack(const vgi_packing *s, const unsigned char *from, vg_frame *f, vg_err *e)
 {
     vgi_packed head;
-    from = take(from, &head, sizeof head);
+    from = take_bytes(from, &head, sizeof head);
     char *name = vgi_copy_string((const char *)from, head.name, e);
     int r = name ? vg_frame_rename(f, name, e) : VG_ENOMEM;
     free(name);
@@ -137,7 +137,7 @@ int vgi_unpack(const vgi_packing *s, const unsigned char *from, vg_frame *f, vg_
         if (!(from = unpack_channel(from, f, e))) return VG_ENOMEM;
     f->has_time = head.has_time, f->time = head.time;
     memcpy(f->root, head.root, sizeof f->root);
-    take(from, f->values, s->values * sizeof *f->values);
+    take_bytes(from, f->values, s->values * sizeof *f->values);
     return VG_OK;
 }
 
@@ -147,7 +147,8 @@ int vgi_pack_write(int fd, uint64_t off, const void *from, size_t n, const char 
         ssize_t some = pwrite(fd, (const unsigned char *)from + done, n - done, (off_t)(off + done));
         if (some < 0 && errno == EINTR) continue;
         if (some < 0)
-            return vg_fail(e, VG_ESYS, "cannot hold frame '%s' in a temporary file: %s: set TMPDIR to another place",
+            return vg_fail(e, VG_ESYS, "cannot hold frame '%s' in a temporary file: %s: set TMPDIR to another "
+                                       "directory",
                            name, strerror(errno));
         done += (size_t)some;
     }

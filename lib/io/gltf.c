@@ -31,7 +31,7 @@ static int take_chunk(const vgi_gltf *g, size_t *off, uint32_t *type, const unsi
                       vg_err *e)
 {
     size_t left = g->file.size - *off;
-    if (left < VGI_GLTF_CHUNK) return vgi_gltf_bad(g, e, "there are bytes behind the last chunk");
+    if (left < VGI_GLTF_CHUNK) return vgi_gltf_bad(g, e, "there are bytes after the last chunk");
     *n = vgi_get32(g->file.data + *off);
     *type = vgi_get32(g->file.data + *off + 4);
     *data = g->file.data + *off + VGI_GLTF_CHUNK;
@@ -47,9 +47,9 @@ static int read_binary(vgi_gltf *g, const unsigned char **bin, size_t *nbin, vg_
     uint32_t type;
     if (g->file.size < VGI_GLTF_HEADER) return cut_short(g, e);
     if (vgi_get32(p + 4) != 2)
-        return vgi_gltf_bad(g, e, "it is GLB version %u, and only version 2 is known", vgi_get32(p + 4));
+        return vgi_gltf_bad(g, e, "it is GLB version %u, but only version 2 is supported", vgi_get32(p + 4));
     if (vgi_get32(p + 8) > g->file.size) return cut_short(g, e);
-    if (vgi_get32(p + 8) < g->file.size) return vgi_gltf_bad(g, e, "there are bytes behind the end of the GLB");
+    if (vgi_get32(p + 8) < g->file.size) return vgi_gltf_bad(g, e, "there are bytes after the end of the GLB");
     int r = take_chunk(g, &off, &type, &data, &n, e);
     if (r == VG_OK && type != VGI_GLTF_JSON) r = vgi_gltf_bad(g, e, "its first chunk is not JSON");
     if (r == VG_OK) r = vgi_json_parse(&g->json, data, n, g->subject, e);
@@ -85,7 +85,7 @@ void vgi_gltf_note_extensions(const vgi_gltf *g, vg_note *note)
     const vgi_json *used = vgi_json_get(g->json, "extensionsUsed");
     for (size_t i = 0; i < vgi_json_count(used); i++) {
         const char *name = vgi_json_text(vgi_json_at(used, i));
-        if (name && !vgi_gltf_is_understood(name)) vgi_note(note, "the extension %.60s is not known and left out", name);
+        if (name && !vgi_gltf_is_understood(name)) vgi_note(note, "the extension %.60s is unknown and ignored", name);
     }
 }
 
@@ -93,9 +93,9 @@ static int check_claims(const vgi_gltf *g, vg_err *e)
 {
     const char *version = vgi_json_text(vgi_json_get(vgi_json_get(g->json, "asset"), "version"));
     const vgi_json *required = vgi_json_get(g->json, "extensionsRequired");
-    if (!version) return vgi_gltf_bad(g, e, "it is no glTF: asset.version is missing");
+    if (!version) return vgi_gltf_bad(g, e, "it is not glTF: asset.version is missing");
     if (!starts_with(version, "2."))
-        return vgi_gltf_bad(g, e, "it is glTF version '%.20s', and only version 2 is known", version);
+        return vgi_gltf_bad(g, e, "it is glTF version '%.20s', but only version 2 is supported", version);
     for (size_t i = 0; i < vgi_json_count(required); i++) {
         const char *name = vgi_json_text(vgi_json_at(required, i));
         if (!name || !vgi_gltf_is_understood(name))
@@ -123,7 +123,7 @@ static int decode_base64(const vgi_gltf *g, const char *s, vg_bytes *to, vg_err 
     int r = vgi_bytes_reserve(to, n / 4 * 3 + 3, e);
     for (size_t i = 0; i < n && r == VG_OK; i++) {
         int digit = digit_of((unsigned char)s[i]);
-        if (digit < 0) return vgi_gltf_bad(g, e, "a buffer's base64 has a character that does not belong there");
+        if (digit < 0) return vgi_gltf_bad(g, e, "a buffer's base64 has an invalid character");
         bits = bits << 6 | (uint32_t)digit;
         size_t have = i % 4; /* preceding digits: with 1, 2 and 3 of them this one completes a byte */
         if (have) to->data[to->size++] = (unsigned char)(bits >> (6 - 2 * have));
@@ -146,14 +146,14 @@ static int path_beside(const vgi_gltf *g, const char *from, const char *uri, vg_
     for (const char *s = uri; *s && r == VG_OK; s++) {
         char c = *s;
         if (c == '%' && hex_of(s[1]) >= 0 && hex_of(s[2]) >= 0) c = (char)(hex_of(s[1]) << 4 | hex_of(s[2])), s += 2;
-        if (!c) return vgi_gltf_bad(g, e, "a buffer has the URI '%.100s', which is no file name", uri);
+        if (!c) return vgi_gltf_bad(g, e, "a buffer has the URI '%.100s', which is not a file name", uri);
         r = vgi_bytes_append(path, &c, 1, e);
     }
     if (r == VG_OK) r = vgi_bytes_append(path, "", 1, e);
     if (r < 0) return r;
     const char *name = (const char *)path->data + start;
     if (*name == '/' || !*name || strstr(name, "..") || strchr(name, ':') || strchr(name, '\\'))
-        return vgi_gltf_bad(g, e, "a buffer is at '%.100s': only files beside or below are read", uri);
+        return vgi_gltf_bad(g, e, "a buffer is at '%.100s': only files in the same directory or below it are read", uri);
     return VG_OK;
 }
 
@@ -164,7 +164,8 @@ static int read_beside(const vgi_gltf *g, vgi_input *in, const char *uri, size_t
     vg_bytes path = {0};
     vgi_input *beside = NULL;
     if (!from)
-        return vgi_gltf_bad(g, e, "its buffer '%.100s' is a file beside, which cannot be found from here: use a .glb",
+        return vgi_gltf_bad(g, e, "its buffer '%.100s' is a separate file, which cannot be found from here: use a "
+                                  ".glb",
                             uri);
     int r = path_beside(g, from, uri, &path, e);
     if (r == VG_OK) r = vgi_input_file(&beside, (char *)path.data, e);
@@ -197,7 +198,7 @@ static int read_buffer(const vgi_gltf *g, vgi_gltf_buffer *b, const vgi_json *fr
     }
     if (n > b->size && vgi_gltf_is_fallback(from)) return VG_OK; /* its views are compressed and stored elsewhere */
     if (n > b->size)
-        return vgi_gltf_bad(g, e, "a buffer is to have %llu bytes and has %zu", (unsigned long long)n, b->size);
+        return vgi_gltf_bad(g, e, "a buffer should have %llu bytes but has %zu", (unsigned long long)n, b->size);
     b->size = (size_t)n;
     return VG_OK;
 }
@@ -248,10 +249,10 @@ int vgi_gltf_item(const vgi_gltf *g, const vgi_json *ref, const char *list, cons
     const vgi_json *all = vgi_json_get(g->json, list);
     uint64_t i;
     if (!vgi_json_whole(ref, &i) || i >= vgi_json_count(all))
-        return vgi_gltf_bad(g, e, "something refers to an element of '%s' that is not there", list);
+        return vgi_gltf_bad(g, e, "something refers to an element of '%s' that does not exist", list);
     *item = vgi_json_at(all, (size_t)i);
     if (!vgi_json_is_object(*item))
-        return vgi_gltf_bad(g, e, "element %llu of '%s' is no object", (unsigned long long)i, list);
+        return vgi_gltf_bad(g, e, "element %llu of '%s' is not an object", (unsigned long long)i, list);
     if (number) *number = (size_t)i;
     return VG_OK;
 }
@@ -262,7 +263,7 @@ static int take_whole(const vgi_gltf *g, const vgi_json *from, const char *key, 
     const vgi_json *j = vgi_json_get(from, key);
     uint64_t value = 0;
     if (j && (!vgi_json_whole(j, &value) || value > SIZE_MAX))
-        return vgi_gltf_bad(g, e, "'%s' is not a whole number", key);
+        return vgi_gltf_bad(g, e, "'%s' is not an integer", key);
     *x = (size_t)value;
     return VG_OK;
 }
@@ -356,7 +357,7 @@ static int take_sparse(const vgi_gltf *g, const vgi_json *from, vgi_accessor *a,
     if (r == VG_OK) r = take_component(g, indices, &a->sparse_component, e);
     if (r == VG_OK && a->sparse_component != VGI_GLTF_UBYTE && a->sparse_component != VGI_GLTF_USHORT &&
         a->sparse_component != VGI_GLTF_UINT)
-        r = vgi_gltf_bad(g, e, "a sparse accessor's indices are no whole numbers");
+        r = vgi_gltf_bad(g, e, "a sparse accessor's indices are not integers");
     if (r == VG_OK)
         r = find_bytes(g, indices, a->nsparse, vgi_gltf_component_bytes(a->sparse_component), &a->sparse, &stride, e);
     if (r == VG_OK && stride != vgi_gltf_component_bytes(a->sparse_component))

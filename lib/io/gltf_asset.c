@@ -13,7 +13,7 @@ typedef vgi_gltf_packing packing;
 
 /* ---- views and accessors ---- */
 
-static int align(packing *k, vg_err *e)
+static int align_bytes(packing *k, vg_err *e)
 {
     static const unsigned char zeros[ALIGNED];
     return vgi_bytes_append(&k->data, zeros, (ALIGNED - k->data.size % ALIGNED) % ALIGNED, e);
@@ -38,7 +38,7 @@ static int put_elements(packing *k, const vgi_accessor *a, bool vertices, size_t
 {
     static const unsigned char zeros[64];
     const size_t element = vgi_accessor_bytes(a), step = vertices ? (element + 3) / 4 * 4 : element;
-    int r = align(k, e);
+    int r = align_bytes(k, e);
     if (r == VG_OK) r = vgi_bytes_reserve(&k->data, k->data.size + a->count * step, e);
     for (size_t i = 0; i < a->count && r == VG_OK; i++) {
         const unsigned char *p = vgi_accessor_at(a, i);
@@ -49,7 +49,7 @@ static int put_elements(packing *k, const vgi_accessor *a, bool vertices, size_t
     return r;
 }
 
-static int describe(packing *k, const vgi_json *old, size_t view, vg_err *e)
+static int add_accessor(packing *k, const vgi_json *old, size_t view, vg_err *e)
 {
     vgi_json *copy = vgi_json_copy(old, e);
     static const char *const gone[] = {"byteOffset", "sparse", "extensions", "extras"};
@@ -72,7 +72,7 @@ static int move_accessor(packing *k, vgi_json *holder, const char *key, int targ
         const size_t start = (k->data.size + ALIGNED - 1) / ALIGNED * ALIGNED;
         int r = put_elements(k, &a, target == ARRAY_BUFFER, &stride, e);
         if (r == VG_OK) r = add_view(k, start, target, stride, &view, e);
-        if (r == VG_OK) r = describe(k, old, view, e);
+        if (r == VG_OK) r = add_accessor(k, old, view, e);
         if (r < 0) return r;
         k->accessor_of[number] = vgi_json_count(k->accessors);
     }
@@ -105,7 +105,7 @@ const char *vgi_gltf_image_type(const unsigned char *p, size_t n)
 int vgi_gltf_embed(packing *k, vgi_json *image, const unsigned char *p, size_t n, const char *type, vg_err *e)
 {
     size_t start, view = 0;
-    int r = align(k, e);
+    int r = align_bytes(k, e);
     start = k->data.size;
     if (r == VG_OK) r = vgi_bytes_append(&k->data, p, n, e);
     if (r == VG_OK) r = add_view(k, start, NO_TARGET, 0, &view, e);
@@ -158,13 +158,13 @@ static void drop_unknown(vgi_json *extensions)
 }
 
 /* Remove unknown extensions at any depth, which the parser has limited. */
-static void strip(vgi_json *j)
+static void strip_extensions(vgi_json *j)
 {
     static const char extensions[] = "extensions";
     drop_unknown(vgi_json_inner(j, extensions));
     if (vgi_json_get(j, extensions) && !vgi_json_key(vgi_json_get(j, extensions), NULL)) vgi_json_drop(j, extensions);
-    for (size_t i = 0; i < vgi_json_count(j); i++) strip(vgi_json_inner_at(j, i));
-    for (const char *key = vgi_json_key(j, NULL); key; key = vgi_json_key(j, key)) strip(vgi_json_inner(j, key));
+    for (size_t i = 0; i < vgi_json_count(j); i++) strip_extensions(vgi_json_inner_at(j, i));
+    for (const char *key = vgi_json_key(j, NULL); key; key = vgi_json_key(j, key)) strip_extensions(vgi_json_inner(j, key));
 }
 
 static int filter_list(vgi_json *doc, const char *key, vg_err *e)
@@ -236,7 +236,7 @@ static int move_all(packing *k, vg_err *e)
 {
     static const char *const gone[] = {"animations", "buffers", "accessors", "bufferViews"};
     for (size_t i = 0; i < sizeof gone / sizeof *gone; i++) vgi_json_drop(k->doc, gone[i]);
-    strip(k->doc);
+    strip_extensions(k->doc);
     int r = filter_list(k->doc, "extensionsUsed", e);
     if (r == VG_OK) r = filter_list(k->doc, "extensionsRequired", e);
     if (r == VG_OK) r = vgi_gltf_pack_begin(k, e);
@@ -272,7 +272,7 @@ int vgi_gltf_pack_end(packing *k, vg_bytes *to, vg_err *e)
 {
     unsigned char head[VGI_GLTF_HEADER] = "glTF";
     vg_bytes text = {0};
-    int r = align(k, e);
+    int r = align_bytes(k, e);
     static const char *const lists[] = {"accessors", "bufferViews"};
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
         if (!vgi_json_count(vgi_json_get(k->doc, lists[i]))) vgi_json_drop(k->doc, lists[i]); /* empty lists are not allowed */

@@ -127,7 +127,7 @@ static int project(making *k, vg_err *e)
     return r;
 }
 
-static double distance(const float *a, const float *b, size_t width)
+static double largest_distance(const float *a, const float *b, size_t width)
 {
     double most = 0;
     for (size_t i = 0; i < width; i += 3) {
@@ -139,7 +139,7 @@ static double distance(const float *a, const float *b, size_t width)
 }
 
 /* Error with the first n directions. Stops once it exceeds `enough`. */
-static int measure(making *k, size_t n, double enough, double *error, vg_err *e)
+static int measure_error(making *k, size_t n, double enough, double *error, vg_err *e)
 {
     int r = VG_OK;
     *error = 0;
@@ -149,29 +149,29 @@ static int measure(making *k, size_t n, double enough, double *error, vg_err *e)
         vgi_product_single(some, k->width, n, k->to->weights + from * k->count, k->count, k->to->targets, k->width,
                            k->met, k->width);
         for (size_t i = 0; i < some; i++)
-            *error = fmax(*error, distance(k->block + i * k->width, k->met + i * k->width, k->width));
+            *error = fmax(*error, largest_distance(k->block + i * k->width, k->met + i * k->width, k->width));
     }
     return r;
 }
 
 /* The smallest sufficient number. */
-static int choose(making *k, vg_err *e)
+static int choose_count(making *k, vg_err *e)
 {
     size_t low = 0, high = k->count; /* low is insufficient, high may be sufficient */
     double error;
     int r = VG_OK;
     while (high - low > 1 && r == VG_OK) {
         const size_t mid = low + (high - low) / 2;
-        r = measure(k, mid, k->tolerance, &error, e);
+        r = measure_error(k, mid, k->tolerance, &error, e);
         if (error <= k->tolerance) high = mid;
         else low = mid;
     }
     k->to->n = high;
-    return r < 0 ? r : measure(k, high, HUGE_VAL, &k->to->error, e);
+    return r < 0 ? r : measure_error(k, high, HUGE_VAL, &k->to->error, e);
 }
 
 /* Compact the weights, and scale so that the largest weight of each target is 1. */
-static void finish(making *k)
+static void scale_weights(making *k)
 {
     vgi_gltf_basis *b = k->to;
     for (size_t i = 0; i < k->in->frames; i++)
@@ -193,7 +193,7 @@ static bool are_finite(const float *x, size_t n)
 }
 
 /* Sums of displacements near the limit of binary32 would overflow. */
-static int check(const making *k, vg_err *e)
+static int check_range(const making *k, vg_err *e)
 {
     const vgi_gltf_basis *b = k->to;
     if (are_finite(b->targets, b->n * k->width) && are_finite(b->weights, b->n * k->in->frames)) return VG_OK;
@@ -215,10 +215,10 @@ static int make_all(making *k, size_t most, vg_err *e)
     count_directions(k, most);
     r = make_directions(k, e);
     if (r == VG_OK) r = project(k, e);
-    if (r == VG_OK) r = choose(k, e);
+    if (r == VG_OK) r = choose_count(k, e);
     if (r < 0) return r;
-    finish(k);
-    return check(k, e);
+    scale_weights(k);
+    return check_range(k, e);
 }
 
 int vgi_gltf_basis_make(vgi_gltf_basis *b, const vgi_gltf_frames_in *in, size_t most, double tolerance, vg_err *e)

@@ -28,7 +28,7 @@ static void linear_transposed(const double m[12], const double p[3], double to[3
 }
 
 /* Returns false if the matrix is singular. */
-static bool invert(const double m[12], double to[12])
+static bool invert_matrix(const double m[12], double to[12])
 {
     const double a[9] = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, shift[3] = {m[3], m[7], m[11]};
     double c[9], size = 0;
@@ -43,7 +43,7 @@ static bool invert(const double m[12], double to[12])
 }
 
 /* Rotate x by the smallest rotation from a to b; a, b: unit or zero. */
-static void turn(const double a[3], const double b[3], const double x[3], double to[3])
+static void rotate_between(const double a[3], const double b[3], const double x[3], double to[3])
 {
     const double c = vgi_dot(a, b);
     double k[3], y[3];
@@ -56,7 +56,7 @@ static void turn(const double a[3], const double b[3], const double x[3], double
 /* ---- positions of the vertices ---- */
 
 /* 1; 0 if the matrix of a node or skin is singular */
-static int place(vgi_gltf_character *c, vg_err *e)
+static int place_vertices(vgi_gltf_character *c, vg_err *e)
 {
     const vgi_gltf_scene *x = &c->scene;
     c->out = vgi_array_raw(c->n, 12 * sizeof(double), e), c->in = vgi_array_raw(c->n, 12 * sizeof(double), e);
@@ -68,7 +68,7 @@ static int place(vgi_gltf_character *c, vg_err *e)
             const size_t at = 12 * (p->first + v);
             c->skinned[p->first + v] = p->skin != VGI_GLTF_NONE;
             vgi_gltf_vertex_matrix(x, p, v, c->out + at);
-            if (!vgi_finite(c->out + at, 12) || !invert(c->out + at, c->in + at)) return 0;
+            if (!vgi_finite(c->out + at, 12) || !invert_matrix(c->out + at, c->in + at)) return 0;
         }
     }
     return 1;
@@ -256,7 +256,7 @@ static void add_twist(const vgi_gltf_character *c, const uint32_t *v, int k, con
         vgi_subtract(world + to, world + from, now);
         vgi_make_unit(before), vgi_make_unit(now);
         if (still) memcpy(turned, before, sizeof turned);
-        else turn(a, b, before, turned);
+        else rotate_between(a, b, before, turned);
         vgi_cross(turned, now, across);
         const double along = vgi_dot(turned, b) * vgi_dot(now, b);
         c->twist[2 * g] += vgi_dot(turned, now) - along;
@@ -298,7 +298,7 @@ static void normal_now(const vgi_gltf_character *c, size_t f, double to[3])
     double turned[3];
     if (vgi_length(a) == 0 || vgi_length(b) == 0) memcpy(turned, c->world_normal + 3 * f, sizeof turned);
     else {
-        turn(a, b, c->world_normal + 3 * f, turned);
+        rotate_between(a, b, c->world_normal + 3 * f, turned);
         twist_about(b, c->twist + 2 * (size_t)c->group[f], turned);
     }
     normal_in(c, f, turned, to);
@@ -404,7 +404,7 @@ int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e)
     if (r < 0) return 0;
     c->n = a->n, c->nv = b->mesh.nv, c->vertex = a->vertex;
     vgi_gltf_rest(&c->scene);
-    if ((r = place(c, e)) <= 0) return r;
+    if ((r = place_vertices(c, e)) <= 0) return r;
     r = find_base(c, b, e);
     if (r == VG_OK) r = find_touches(c, e);
     if (r == VG_OK) r = find_normals(c, b, e);

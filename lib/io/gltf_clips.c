@@ -75,7 +75,7 @@ static int add_channel(vgi_gltf_scene *x, const vgi_json *animation, const vgi_j
     if (r <= 0) return r;
     const vgi_json *samplers = vgi_json_get(animation, "samplers");
     if (!vgi_json_whole(vgi_json_get(from, "sampler"), &sampler) || sampler >= vgi_json_count(samplers))
-        return vgi_gltf_bad(&x->g, e, "an animation refers to a sampler that is not there");
+        return vgi_gltf_bad(&x->g, e, "an animation refers to a sampler that does not exist");
     r = read_sampler(x, &c, vgi_json_at(samplers, (size_t)sampler), e);
     if (r == VG_OK) r = vgi_grow(&x->channels, &x->channels_cap, x->nchannels + 1, sizeof *x->channels, e);
     if (r == VG_OK) x->channels[x->nchannels++] = c;
@@ -157,7 +157,7 @@ static int add_moments(vgi_gltf_scene *x, const vgi_gltf_channel *c, vg_err *e)
 }
 
 /* Merge moments at the same time. */
-static size_t unite(vgi_gltf_moment *m, size_t n)
+static size_t merge_moments(vgi_gltf_moment *m, size_t n)
 {
     size_t kept = 0;
     qsort(m, n, sizeof *m, by_time);
@@ -194,7 +194,7 @@ static int add_keys(vgi_gltf_scene *x, size_t first, vg_err *e)
         if (i > first && same_times(&x->channels[i - 1], &x->channels[i])) continue;
         r = add_moments(x, &x->channels[i], e);
     }
-    if (r == VG_OK) x->nmoments = moments + unite(x->moments + moments, x->nmoments - moments);
+    if (r == VG_OK) x->nmoments = moments + merge_moments(x->moments + moments, x->nmoments - moments);
     return r;
 }
 
@@ -276,7 +276,7 @@ static size_t last_key_before(const vgi_accessor *in, double t)
 }
 
 /* work: workspace of 4 * width numbers. */
-static void sample(const vgi_gltf_channel *c, double t, double *to, double *work)
+static void sample_channel(const vgi_gltf_channel *c, double t, double *to, double *work)
 {
     const size_t key = last_key_before(&c->in, t), n = c->width;
     double t0, t1 = 0;
@@ -313,7 +313,7 @@ int vgi_gltf_animate(vgi_gltf_scene *x, const vgi_gltf_moment *m, vg_err *e)
                      : ch->path == VGI_GLTF_ROTATION  ? n->now.rotation
                      : ch->path == VGI_GLTF_SCALE     ? n->now.scale
                                                       : n->weights;
-        sample(ch, m->time, to, work);
+        sample_channel(ch, m->time, to, work);
     }
     free(work);
     return VG_OK;

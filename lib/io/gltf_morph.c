@@ -12,7 +12,7 @@
 
 enum { USUAL_TARGETS = 100, USUAL_PER_MILLE = 1 };
 
-static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
+static int begin_morphs(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 {
     const size_t nv = w->h->body.mesh.nv;
     vgi_gltf_morphs *x = w->own = vgi_array(1, sizeof *x, e);
@@ -25,7 +25,7 @@ static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 }
 
 /* A single frame that is the base itself needs no target and no animation. */
-static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
+static int put_morph_frame(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
     const size_t n = 3 * w->h->body.mesh.nv;
@@ -43,7 +43,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 
 /* ---- choice of target frames ---- */
 
-static int load(const vgi_gltf_writing *w, size_t frame, float *to, vg_err *e)
+static int load_frame(const vgi_gltf_writing *w, size_t frame, float *to, vg_err *e)
 {
     const vgi_gltf_morphs *x = w->own;
     const size_t n = 3 * w->h->body.mesh.nv, bytes = VGI_GLTF_ITEM * n;
@@ -54,7 +54,7 @@ static int load(const vgi_gltf_writing *w, size_t frame, float *to, vg_err *e)
 
 static int load_for_basis(void *context, size_t frame, float *to, vg_err *e)
 {
-    return load(context, frame, to, e);
+    return load_frame(context, frame, to, e);
 }
 
 static bool moves_nothing(const float *d, size_t n)
@@ -69,7 +69,7 @@ static int take_frames(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
     if (!(x->chosen = vgi_array(w->frames, sizeof *x->chosen, e))) return VG_ENOMEM;
-    int r = load(w, 0, x->first, e);
+    int r = load_frame(w, 0, x->first, e);
     const bool skip = r == VG_OK && w->still && moves_nothing(x->first, 3 * w->h->body.mesh.nv);
     for (size_t i = skip; i < w->frames && r == VG_OK; i++) x->chosen[x->targets++] = i;
     return r;
@@ -186,7 +186,7 @@ static int turn_basis(vgi_gltf_writing *w, vg_err *e)
     x->turned = vgi_array(x->targets, 3 * sizeof *x->turned * x->n, e);
     int r = x->turned ? vgi_gltf_basis_solve(&x->basis, w->frames, &solved, e) : VG_ENOMEM;
     for (size_t f = 0; f < w->frames && r == VG_OK; f++) {
-        if ((r = load(w, f, x->first, e)) < 0) break;
+        if ((r = load_frame(w, f, x->first, e)) < 0) break;
         find_world(w, x->first);
         turn_normals(w);
         for (size_t t = 0; t < x->targets; t++) {
@@ -204,7 +204,7 @@ int vgi_gltf_load_target(vgi_gltf_writing *w, size_t t, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
     const size_t n = 3 * w->h->body.mesh.nv;
-    int r = x->chosen ? load(w, x->chosen[t], x->first, e) : VG_OK;
+    int r = x->chosen ? load_frame(w, x->chosen[t], x->first, e) : VG_OK;
     if (!x->chosen) memcpy(x->first, x->basis.targets + t * n, n * sizeof *x->first);
     if (r < 0) return r;
     if (x->chosen) spread_frame(w);
@@ -358,7 +358,7 @@ static int say_scene(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : say_mesh(w, e);
 }
 
-static int describe(vgi_gltf_writing *w, vg_err *e)
+static int describe_morphs(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_morphs *x = w->own;
     int r = choose_targets(w, e);
@@ -388,7 +388,7 @@ static int emit_weights(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-static int emit(vgi_gltf_writing *w, vg_err *e)
+static int emit_morphs(vgi_gltf_writing *w, vg_err *e)
 {
     int r = w->still ? VG_OK : emit_weights(w, e);
     return r < 0 ? r : vgi_gltf_emit_targets(w, e);
@@ -421,7 +421,7 @@ static bool report(const vgi_gltf_writing *w, char *to, size_t room)
     return true;
 }
 
-static void release(void *own)
+static void release_morphs(void *own)
 {
     vgi_gltf_morphs *x = own;
     if (!x) return;
@@ -434,4 +434,4 @@ static void release(void *own)
     free(x);
 }
 
-const vgi_gltf_manner vgi_gltf_by_morphs = {begin, put, describe, emit, warning, report, release, "use --max-targets", true};
+const vgi_gltf_manner vgi_gltf_by_morphs = {begin_morphs, put_morph_frame, describe_morphs, emit_morphs, warning, report, release_morphs, "use --max-targets", true};

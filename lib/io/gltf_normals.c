@@ -51,7 +51,7 @@ static size_t list_sides(const vg_mesh *m, side *to)
 }
 
 /* The smaller number is kept, so that groups do not depend on the order of edges. */
-static void unite(uint32_t *parent, uint32_t c, uint32_t d)
+static void join_corners(uint32_t *parent, uint32_t c, uint32_t d)
 {
     c = vgi_sets_find(parent, c), d = vgi_sets_find(parent, d);
     if (c < d) parent[d] = c;
@@ -84,8 +84,8 @@ static void unite_corners(uint32_t *parent, const side *sides, size_t n, const i
     for (size_t i = 1; i < n; i++) {
         const side *s = &sides[i - 1], *t = &sides[i];
         if (s->low != t->low || s->high != t->high || !is_smooth(s, t, smoothing, normal)) continue;
-        unite(parent, s->at_low, t->at_low);
-        unite(parent, s->at_high, t->at_high);
+        join_corners(parent, s->at_low, t->at_low);
+        join_corners(parent, s->at_high, t->at_high);
     }
 }
 

@@ -11,7 +11,7 @@
 static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
 /* to = a b; `to` must differ from both. */
-static void multiply(const double a[12], const double b[12], double to[12])
+static void multiply_affine(const double a[12], const double b[12], double to[12])
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++) {
@@ -32,7 +32,7 @@ static void place_nodes(vgi_gltf_scene *x)
         double local[12];
         if (n->fixed) memcpy(local, n->matrix, sizeof local);
         else vgi_gltf_local_matrix(&n->now, local);
-        multiply(n->parent == SIZE_MAX ? identity : x->nodes[n->parent].world, local, n->world);
+        multiply_affine(n->parent == SIZE_MAX ? identity : x->nodes[n->parent].world, local, n->world);
     }
 }
 
@@ -47,7 +47,7 @@ static void place_joints(vgi_gltf_scene *x)
                 vgi_accessor_get(&k->inverse, j, columns);
                 vgi_gltf_from_columns(columns, inverse);
             }
-            multiply(x->nodes[k->joints[j]].world, inverse, k->matrices + 12 * j);
+            multiply_affine(x->nodes[k->joints[j]].world, inverse, k->matrices + 12 * j);
         }
     }
 }
@@ -55,7 +55,7 @@ static void place_joints(vgi_gltf_scene *x)
 /* ---- frames ---- */
 
 /* Reset nodes to the file's values. morphed: keep the file's morph weights, otherwise use none. */
-static void rest(vgi_gltf_scene *x, bool morphed)
+static void reset_nodes(vgi_gltf_scene *x, bool morphed)
 {
     for (size_t i = 0; i < x->nnodes; i++) {
         vgi_gltf_node *n = &x->nodes[i];
@@ -65,7 +65,7 @@ static void rest(vgi_gltf_scene *x, bool morphed)
 }
 
 /* The position of vertex v under its joints; false if no joint has a weight. */
-static bool bend(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, const double at[3], double to[3])
+static bool skin_vertex(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, const double at[3], double to[3])
 {
     const vgi_gltf_skin *k = &x->skins[p->skin];
     double sum = 0, total[3] = {0}, joints[4], shares[4];
@@ -86,7 +86,7 @@ static bool bend(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, cons
 
 void vgi_gltf_rest(vgi_gltf_scene *x)
 {
-    rest(x, false);
+    reset_nodes(x, false);
     place_nodes(x);
     place_joints(x);
 }
@@ -103,7 +103,7 @@ void vgi_gltf_vertex_matrix(const vgi_gltf_scene *x, const vgi_gltf_part *p, siz
             sum += shares[i];
         }
     }
-    if (sum == 0) multiply(x->nodes[p->node].world, p->place, m);
+    if (sum == 0) multiply_affine(x->nodes[p->node].world, p->place, m);
     else
         for (int k = 0; k < 12; k++) m[k] = total[k] / sum;
 }
@@ -121,14 +121,14 @@ static void pose_part(const vgi_gltf_scene *x, const vgi_gltf_part *p, double *t
         }
     }
     double world[12];
-    multiply(n->world, p->place, world);
+    multiply_affine(n->world, p->place, world);
     for (size_t i = 0; i < p->nkept; i++) {
         memcpy(at, to + 3 * i, sizeof at);
-        if (p->skin == VGI_GLTF_NONE || !bend(x, p, p->kept[i], at, to + 3 * i)) vgi_gltf_move_point(world, at, to + 3 * i);
+        if (p->skin == VGI_GLTF_NONE || !skin_vertex(x, p, p->kept[i], at, to + 3 * i)) vgi_gltf_move_point(world, at, to + 3 * i);
     }
 }
 
-static int pose(vgi_gltf_scene *x, double *to, vg_err *e)
+static int pose_vertices(vgi_gltf_scene *x, double *to, vg_err *e)
 {
     size_t n = 0;
     place_nodes(x);
@@ -178,9 +178,9 @@ int vgi_gltf_next(void *state, vg_frame *f, vg_err *e)
 {
     vgi_gltf_scene *x = state;
     if (x->next == x->frames) return 0;
-    rest(x, x->nclips > 0);
+    reset_nodes(x, x->nclips > 0);
     int r = x->nclips ? begin_moment(x, x->next, f, e) : begin_shape(x, x->next, f, e);
-    if (r == VG_OK) r = pose(x, f->values, e);
+    if (r == VG_OK) r = pose_vertices(x, f->values, e);
     x->next++;
     return r < 0 ? r : 1;
 }
@@ -200,8 +200,8 @@ static int take_reference(vgi_gltf_scene *x, vg_head *h, vg_err *e)
     const char *name = vgi_json_text(vgi_json_get(mesh, "name"));
     if (name && *name && !(h->body.reference_name = vgi_copy_string(name, strlen(name), e))) return VG_ENOMEM;
     if (!(h->body.reference = vgi_array(h->body.mesh.nv, 3 * sizeof *h->body.reference, e))) return VG_ENOMEM;
-    rest(x, false);
-    return pose(x, h->body.reference, e);
+    reset_nodes(x, false);
+    return pose_vertices(x, h->body.reference, e);
 }
 
 static int set_up(vgi_gltf_scene *x, const vg_reading *how, vg_err *e)

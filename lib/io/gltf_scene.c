@@ -82,7 +82,7 @@ static int order_nodes(vgi_gltf_scene *x, vg_err *e)
     return n == x->nnodes ? VG_OK : vgi_gltf_bad(&x->g, e, "its nodes are in a cycle");
 }
 
-static double determinant(const double m[12])
+static double affine_determinant(const double m[12])
 {
     return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
            m[2] * (m[4] * m[9] - m[5] * m[8]);
@@ -94,7 +94,7 @@ static void find_mirrors(vgi_gltf_scene *x)
     for (size_t i = 0; i < x->nnodes; i++) {
         vgi_gltf_node *n = &x->nodes[x->order[i]];
         const double *s = n->rest.scale;
-        const bool here = n->fixed ? determinant(n->matrix) < 0 : (s[0] < 0) ^ (s[1] < 0) ^ (s[2] < 0);
+        const bool here = n->fixed ? affine_determinant(n->matrix) < 0 : (s[0] < 0) ^ (s[1] < 0) ^ (s[2] < 0);
         n->mirrors = here ^ (n->parent != SIZE_MAX && x->nodes[n->parent].mirrors);
     }
 }
@@ -222,11 +222,11 @@ static int read_influences(vgi_gltf_scene *x, vgi_gltf_part *p, vg_err *e)
         const vgi_json *j = vgi_json_get(p->attributes, joints), *w = vgi_json_get(p->attributes, weights);
         if (!j || !w) break;
         if (p->nsets == VGI_GLTF_SETS)
-            return vgi_gltf_bad(&x->g, e, "vertices hang on more than %d joints", 4 * VGI_GLTF_SETS);
+            return vgi_gltf_bad(&x->g, e, "vertices have more than %d joints", 4 * VGI_GLTF_SETS);
         vgi_accessor *a = &p->joints[p->nsets];
         r = vgi_gltf_accessor(&x->g, j, 4, p->count, "joints", a, e);
         if (r == VG_OK && !vgi_accessor_is_index(a))
-            r = vgi_gltf_bad(&x->g, e, "the joints of a vertex are no whole numbers");
+            r = vgi_gltf_bad(&x->g, e, "the joints of a vertex are not integers");
         if (r == VG_OK) r = check_joints(x, p, a, e);
         if (r == VG_OK) r = vgi_gltf_accessor(&x->g, w, 4, p->count, "weights", &p->shares[p->nsets], e);
     }
@@ -283,7 +283,8 @@ static void read_uv(vgi_gltf_scene *x, vgi_gltf_part *p)
     const vgi_json *ref = vgi_json_get(p->attributes, "TEXCOORD_0");
     if (!ref) return;
     p->textured = vgi_gltf_accessor(&x->g, ref, 2, p->count, "texture coordinates", &p->uv, NULL) == VG_OK;
-    if (!p->textured && !strstr(x->note.text, "texture coord")) vgi_note(&x->note, "left out wrong texture coordinates");
+    if (!p->textured && !strstr(x->note.text, "texture coord")) vgi_note(&x->note, "left out malformed texture "
+                                                                                   "coordinates");
     p->first_uv = x->nuv;
     if (p->textured) x->nuv += p->count;
 }
@@ -328,7 +329,7 @@ static int corner(const vgi_gltf_scene *x, const vgi_gltf_faces *f, size_t i, ui
     double v = (double)i;
     if (f->indexed) vgi_accessor_get(&f->index, i, &v);
     if (v >= (double)f->part->count)
-        return vgi_gltf_bad(&x->g, e, "an index is %.0f where there are %zu vertices", v, f->part->count);
+        return vgi_gltf_bad(&x->g, e, "an index is %.0f, but there are %zu vertices", v, f->part->count);
     *to = (uint32_t)(f->part->first + (size_t)v);
     return VG_OK;
 }
@@ -356,7 +357,7 @@ static int add_faces(const vgi_gltf_scene *x, vgi_gltf_faces *f, size_t n, uint6
     int r = VG_OK;
     if (mode == VGI_GLTF_POINTS) return VG_OK;
     if (apart && n % size)
-        return vgi_gltf_bad(&x->g, e, "%zu indices do not make whole %s", n, lines ? "lines" : "triangles");
+        return vgi_gltf_bad(&x->g, e, "%zu indices do not form complete %s", n, lines ? "lines" : "triangles");
     if (mode == VGI_GLTF_LINE_LOOP && n < 2) return vgi_gltf_bad(&x->g, e, "a loop has %zu vertices", n);
     for (size_t i = 0; i < count && r == VG_OK; i++) {
         const size_t a = apart ? size * i : i, odd = mode == VGI_GLTF_STRIP && i % 2;
@@ -410,7 +411,7 @@ static int read_faces(vgi_gltf_scene *x, vgi_gltf_faces *f, const vgi_gltf_part 
     f->part = p, f->indexed = indices;
     int r = indices ? vgi_gltf_accessor(&x->g, indices, 1, 0, "indices", &f->index, e) : VG_OK;
     if (r == VG_OK && indices && !vgi_accessor_is_index(&f->index))
-        r = vgi_gltf_bad(&x->g, e, "indices are no whole numbers");
+        r = vgi_gltf_bad(&x->g, e, "indices are not integers");
     return r < 0 ? r : add_faces(x, f, indices ? f->index.count : p->count, mode, e);
 }
 

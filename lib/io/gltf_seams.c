@@ -26,13 +26,13 @@ static bool same_place(const vg_attributes *a, uint32_t s, uint32_t t)
 }
 
 /* Whether a vertex with the attributes `has` can also have `wants`. Unset ones match any. */
-static bool suits(const cutting *k, look has, look wants)
+static bool suits_look(const cutting *k, look has, look wants)
 {
     if (has.group != UNSET && wants.group != UNSET && has.group != wants.group) return false;
     return has.tex == UNSET || wants.tex == UNSET || same_place(k->a, has.tex - 1, wants.tex - 1);
 }
 
-static void complete(look *has, look wants)
+static void complete_look(look *has, look wants)
 {
     if (has->tex == UNSET) has->tex = wants.tex;
     if (has->group == UNSET) has->group = wants.group;
@@ -55,7 +55,7 @@ static int add_copy(cutting *k, uint32_t v, look wants, uint32_t *copy, vg_err *
 static int find_vertex(cutting *k, uint32_t v, look wants, uint32_t *to, vg_err *e)
 {
     *to = v;
-    while (!suits(k, k->look[*to], wants)) {
+    while (!suits_look(k, k->look[*to], wants)) {
         if (k->next[*to]) {
             *to = k->next[*to];
             continue;
@@ -65,7 +65,7 @@ static int find_vertex(cutting *k, uint32_t v, look wants, uint32_t *to, vg_err 
         if (r == VG_OK) k->next[last] = copy, *to = copy;
         return r;
     }
-    complete(&k->look[*to], wants);
+    complete_look(&k->look[*to], wants);
     return VG_OK;
 }
 
@@ -83,7 +83,7 @@ static int place_texture(const cutting *k, vg_err *e)
     return VG_OK;
 }
 
-static int cut(cutting *k, const vg_mesh *m, bool textured, const uint32_t *group, vg_err *e)
+static int cut_mesh(cutting *k, const vg_mesh *m, bool textured, const uint32_t *group, vg_err *e)
 {
     vgi_gltf_seams *s = k->to;
     const size_t corners = vg_mesh_corners(m);
@@ -106,7 +106,7 @@ int vgi_gltf_seams_make(vgi_gltf_seams *s, const vg_mesh *m, const vg_attributes
     k.look = vgi_array(m->nv, sizeof *k.look, e), k.next = vgi_array(m->nv, sizeof *k.next, e);
     int r = s->from && k.look && k.next ? VG_OK : VG_ENOMEM;
     for (size_t v = 0; v < m->nv && r == VG_OK; v++) s->from[v] = (uint32_t)v;
-    if (r == VG_OK) r = cut(&k, m, textured, group, e);
+    if (r == VG_OK) r = cut_mesh(&k, m, textured, group, e);
     free(k.look);
     free(k.next);
     if (r < 0) vgi_gltf_seams_clear(s);

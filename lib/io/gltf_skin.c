@@ -86,7 +86,7 @@ static int place_rest(const vgi_gltf_writing *w, skinning *x, vg_err *e)
     const size_t n = joints_of(w);
     for (size_t i = 0; i < 3 * n; i++) {
         x->at[i] = (float)w->h->body.rig.at[i];
-        if (!isfinite(x->at[i])) return vg_fail(e, VG_EINPUT, "the place of a joint is too large for binary32");
+        if (!isfinite(x->at[i])) return vg_fail(e, VG_EINPUT, "the position of a joint is too large for binary32");
     }
     for (size_t i = 0; i < 3 * n; i++) {
         uint32_t parent = parent_of(w, i / 3);
@@ -104,7 +104,7 @@ static int check_weights(const vgi_gltf_writing *w, vg_err *e)
     return VG_OK;
 }
 
-static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
+static int begin_skin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 {
     const size_t n = joints_of(w);
     if (o->most_targets || o->morph_tolerance > 0 || o->shapes || o->quantize)
@@ -179,7 +179,7 @@ static void note_motion(skinning *x, size_t j, const float local[LOCAL])
     x->grows[j] |= fabs(local[SIZE] - 1.0) > still;
 }
 
-static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
+static int put_skin_frame(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 {
     skinning *x = w->own;
     const size_t n = joints_of(w);
@@ -347,7 +347,7 @@ static int say_animation(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "}}]");
 }
 
-static int describe(vgi_gltf_writing *w, vg_err *e)
+static int describe_skin(vgi_gltf_writing *w, vg_err *e)
 {
     int r = describe_points(w, e);
     if (r == VG_OK) r = describe_inverse(w, e);
@@ -454,7 +454,7 @@ static int emit_channels(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-static int emit(vgi_gltf_writing *w, vg_err *e)
+static int emit_skin(vgi_gltf_writing *w, vg_err *e)
 {
     int r = vgi_gltf_emit_singles(w, w->base, 3 * w->seams.n, e);
     if (r == VG_OK && w->normals.n) r = vgi_gltf_emit_singles(w, w->normals.base, 3 * w->normals.n, e);
@@ -463,7 +463,7 @@ static int emit(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : emit_channels(w, e);
 }
 
-static void release(void *own)
+static void release_skin(void *own)
 {
     skinning *x = own;
     if (!x) return;
@@ -480,4 +480,4 @@ static bool report(const vgi_gltf_writing *w, char *to, size_t room)
     return false;
 }
 
-const vgi_gltf_manner vgi_gltf_by_skin = {begin, put, describe, emit, NULL, report, release, "write fewer frames", false};
+const vgi_gltf_manner vgi_gltf_by_skin = {begin_skin, put_skin_frame, describe_skin, emit_skin, NULL, report, release_skin, "write fewer frames", false};

@@ -19,14 +19,14 @@ static int failed(const vgi_gltf *g, int r, const char *codec, const char *exten
     if (r == VGI_CODEC_NONE)
         return vgi_gltf_bad(g, e, "it is compressed with %s (%s), which this build does not read: export without compression",
                             codec, extension);
-    return vgi_gltf_bad(g, e, "it is compressed with %s (%s), and the data are not valid", codec, extension);
+    return vgi_gltf_bad(g, e, "it is compressed with %s (%s), and the data are malformed", codec, extension);
 }
 
 static int whole(const vgi_gltf *g, const vgi_json *from, const char *key, size_t *x, vg_err *e)
 {
     uint64_t value;
     if (!vgi_json_whole(vgi_json_get(from, key), &value) || value > SIZE_MAX / 2)
-        return vgi_gltf_bad(g, e, "'%s' is not a whole number", key);
+        return vgi_gltf_bad(g, e, "'%s' is not an integer", key);
     *x = (size_t)value;
     return VG_OK;
 }
@@ -44,7 +44,7 @@ static int add_buffer(vgi_gltf *g, vg_bytes *own, size_t *number, vg_err *e)
 {
     if (!is_plausible(g, own->size)) {
         vg_bytes_clear(own);
-        return vgi_gltf_bad(g, e, "its compressed data become more than %d times their size", MOST_RATIO_OF_ALL);
+        return vgi_gltf_bad(g, e, "its compressed data expand to more than %d times their size", MOST_RATIO_OF_ALL);
     }
     vgi_json *list = vgi_json_inner(g->json, "buffers"), *buffer = vgi_json_object(e);
     int r = buffer ? vgi_json_put(buffer, "byteLength", vgi_json_of_whole(own->size, e), e) : VG_ENOMEM;
@@ -81,7 +81,7 @@ static int compressed_bytes(const vgi_gltf *g, const vgi_json *x, const unsigned
 {
     size_t number = 0, off = 0;
     int r = whole(g, x, "buffer", &number, e);
-    if (r == VG_OK && number >= g->nbuffers) r = vgi_gltf_bad(g, e, "something refers to a buffer that is not there");
+    if (r == VG_OK && number >= g->nbuffers) r = vgi_gltf_bad(g, e, "something refers to a buffer that does not exist");
     if (r == VG_OK && vgi_json_get(x, "byteOffset")) r = whole(g, x, "byteOffset", &off, e);
     if (r == VG_OK) r = whole(g, x, "byteLength", n, e);
     if (r < 0) return r;
@@ -162,7 +162,7 @@ static int put_bytes(vgi_gltf *g, vgi_json *accessor, vg_bytes *bytes, vg_err *e
     return vgi_json_put(accessor, "bufferView", vgi_json_of_whole(at, e), e);
 }
 
-static bool counts(const vgi_json *accessor, size_t n)
+static bool has_count(const vgi_json *accessor, size_t n)
 {
     uint64_t count;
     return accessor && vgi_json_whole(vgi_json_get(accessor, "count"), &count) && count == n && n > 0;
@@ -173,7 +173,7 @@ static int unpack_indices(vgi_gltf *g, const vgi_draco *m, const vgi_json *primi
     vgi_json *a = accessor_of(g, vgi_json_get(primitive, "indices"));
     const size_t n = vgi_draco_corners(m);
     vg_bytes bytes = {0};
-    if (!counts(a, n)) return failed(g, VGI_CODEC_BAD, "Draco", draco, e);
+    if (!has_count(a, n)) return failed(g, VGI_CODEC_BAD, "Draco", draco, e);
     uint32_t *index = vgi_array_raw(n, sizeof *index, e);
     int r = index ? vgi_bytes_reserve(&bytes, n * sizeof *index, e) : VG_ENOMEM;
     if (r == VG_OK) {
@@ -192,7 +192,7 @@ static int unpack_attribute(vgi_gltf *g, const vgi_draco *m, vgi_json *a, const 
     const size_t n = vgi_draco_points(m), width = vgi_gltf_width(vgi_json_text(vgi_json_get(a, "type")));
     uint64_t component = 0, unique = 0;
     vg_bytes bytes = {0};
-    if (!counts(a, n) || !vgi_json_whole(vgi_json_get(a, "componentType"), &component) || component > VGI_GLTF_FLOAT ||
+    if (!has_count(a, n) || !vgi_json_whole(vgi_json_get(a, "componentType"), &component) || component > VGI_GLTF_FLOAT ||
         !vgi_json_whole(id, &unique) || unique > UINT32_MAX || !width || width > 4)
         return failed(g, VGI_CODEC_BAD, "Draco", draco, e);
     const size_t size = vgi_gltf_component_bytes((int)component) * width * n;

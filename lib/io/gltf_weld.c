@@ -333,7 +333,7 @@ static uint32_t uv_of(const vgi_gltf_scene *x, uint32_t v)
 
 /* Faces of the welded vertices; degenerate ones are dropped, which strips also contain. Returns their number. uv (may
  * be NULL): texture coordinate per corner. Labels are adapted. */
-static size_t renumber(vgi_gltf_scene *x, vg_mesh *m, const uint32_t *number, uint32_t *uv)
+static size_t renumber_faces(vgi_gltf_scene *x, vg_mesh *m, const uint32_t *number, uint32_t *uv)
 {
     size_t nf = 0, corners = 0, label = 0;
     for (size_t f = 0; f < m->nf; f++) {
@@ -387,7 +387,7 @@ static int weld_parts(vgi_gltf_scene *x, const welding *k, size_t *n, vg_err *e)
     return r;
 }
 
-static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
+static int weld_vertices(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
 {
     welding k = {.x = x, .nslots = 4};
     while (k.nslots < 2 * x->all) k.nslots *= 2;
@@ -403,7 +403,7 @@ static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
         r = weld_parts(x, &k, &n, e);
     }
     if (r == VG_OK) r = take_uv(x, m, e);
-    if (r == VG_OK) x->dropped = renumber(x, m, k.number, x->attributes.corner_tex);
+    if (r == VG_OK) x->dropped = renumber_faces(x, m, k.number, x->attributes.corner_tex);
     m->nv = n;
     free(k.slots);
     return r;
@@ -412,5 +412,5 @@ static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
 int vgi_gltf_mend(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
 {
     int r = restore_polygons(x, f, e);
-    return r < 0 ? r : weld(x, &f->mesh, e);
+    return r < 0 ? r : weld_vertices(x, &f->mesh, e);
 }

@@ -18,10 +18,11 @@ static int check_skin(const vg_head *h, const char *output, vg_err *e)
 {
     const char *lacks = NULL;
     if (!h->body.rig.skeleton.njoints)
-        lacks = "the input holds transforms of no skeleton: make vertices of them with 'vg-play MAP' first";
+        lacks = "the input holds transforms without a skeleton: convert them to vertices with 'vg-play MAP' first";
     else if (!h->body.rig.skin_bone)
-        lacks = "the rig of the input has no weights: make vertices of it with 'vg-play MAP' first";
-    else if (h->count != h->body.rig.nbones) lacks = "the input has not as many transforms as its rig has bones";
+        lacks = "the rig of the input has no weights: convert it to vertices with 'vg-play MAP' first";
+    else if (h->count != h->body.rig.nbones) lacks = "the input has a different number of transforms than its rig "
+                                                     "has bones";
     return lacks ? vg_fail(e, VG_EINPUT, "cannot write '%s': %s", output, lacks) : VG_OK;
 }
 
@@ -258,7 +259,7 @@ static int describe_character(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say_elements(c->scene.g.json, "accessors", &w->accessors, &w->naccessors, e);
 }
 
-static int describe(vgi_gltf_writing *w, vg_err *e)
+static int describe_file(vgi_gltf_writing *w, vg_err *e)
 {
     int r = w->character ? describe_character(w, e) : vgi_gltf_describe_library(w, e);
     if (r == VG_OK && !w->character) r = describe_indices(w, false, &w->triangles, e);
@@ -273,7 +274,7 @@ static int say_all(vgi_gltf_writing *w, vg_err *e)
     int r = w->character ? vgi_gltf_say_cast_asset(w, e)
                          : vgi_gltf_say(&w->json, e,
                                         "{\"asset\":{\"version\":\"2.0\",\"generator\":\"vg " VG_VERSION "\"},\n");
-    if (r == VG_OK) r = describe(w, e);
+    if (r == VG_OK) r = describe_file(w, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\n\"accessors\":[");
     if (r == VG_OK) r = vgi_bytes_append(&w->json, w->accessors.data, w->accessors.size, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "],\n\"bufferViews\":[");
@@ -425,7 +426,7 @@ static bool has_materials(const vg_attributes *a)
 static void note_losses(vgi_gltf_writing *w)
 {
     const vg_body *b = &w->h->body;
-    if (w->times_lost) note_loss(w, "the times of the frames: they do not ascend from 0 or later");
+    if (w->times_lost) note_loss(w, "the times of the frames, which do not ascend from 0 or later");
     if (!w->character) {
         char asset[120];
         vg_asset_text(&b->asset, asset, sizeof asset);

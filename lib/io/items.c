@@ -125,7 +125,7 @@ static int tell_content(const vgi_items *items, vgi_item *it, vgi_input *in, vg_
     if (r == VG_OK && !vgi_is_stream(data, n)) r = vgi_input_peek(in, 4096, &data, &n, e);
     if (r < 0) return r;
     if (n == 0 && !it->path)
-        return vg_fail(e, VG_ETRUNC, "standard input is empty: look at the program before in the pipe");
+        return vg_fail(e, VG_ETRUNC, "standard input is empty: did the program before it fail?");
     if (n == 0) return vg_fail(e, VG_ETRUNC, "'%s' is empty", it->path);
     r = vgi_plain_text(&own, &data, &n, e);
     if (r == VG_OK) r = judge_start(items, it, data, n, e);

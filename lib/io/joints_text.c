@@ -221,7 +221,7 @@ static int take_joint(reading *b, double *places, vg_err *e)
         return vg_fail(e, VG_EINPUT, "%s line %zu: joint '%.*s' is already defined in this frame", b->lines.subject,
                        l->number, shown, f->begin);
     if (b->frames && !b->met[j])
-        return vg_fail(e, VG_EINPUT, "%s line %zu: joint '%.*s' is not in the frames before", b->lines.subject,
+        return vg_fail(e, VG_EINPUT, "%s line %zu: joint '%.*s' is not in earlier frames", b->lines.subject,
                        l->number, shown, f->begin);
     b->met[j] = b->frames + 1;
     int r = VG_OK;

@@ -31,7 +31,7 @@ int vgi_json_parse(vgi_json **j, const void *text, size_t n, const char *subject
     *j = json_loadb(text, n, 0, &cause);
     if (*j) return VG_OK;
     if (out_of_memory) return vg_fail(e, VG_ENOMEM, "not enough memory to read %s", subject);
-    return vg_fail(e, VG_EINPUT, "%s: wrong JSON in line %d: %s", subject, cause.line, cause.text);
+    return vg_fail(e, VG_EINPUT, "%s: malformed JSON in line %d: %s", subject, cause.line, cause.text);
 }
 
 void vgi_json_free(vgi_json **j)

@@ -68,7 +68,7 @@ bool vgi_field_number(const vgi_field *f, double *x)
     return vgi_parse_double(f->begin, f->end, x) == f->end && vgi_finite(x, 1);
 }
 
-static int shown(const vgi_field *f)
+static int shown_length(const vgi_field *f)
 {
     return f->end - f->begin < SHOWN ? (int)(f->end - f->begin) : SHOWN;
 }
@@ -77,7 +77,7 @@ int vgi_field_vertex(const vgi_lines *t, const vgi_line *l, const vgi_field *f, 
 {
     int64_t x;
     if (vgi_parse_int(f->begin, f->end, &x) != f->end)
-        return vg_fail(e, VG_EINPUT, "%s line %zu: '%.*s' is no vertex number", t->subject, l->number, shown(f),
+        return vg_fail(e, VG_EINPUT, "%s line %zu: '%.*s' is not a vertex number", t->subject, l->number, shown_length(f),
                        f->begin);
     if (x < base || x - base >= UINT32_MAX)
         return vg_fail(e, VG_EINPUT, "%s line %zu: there is no vertex %lld: vertices are counted from %d", t->subject,
@@ -95,7 +95,7 @@ int vgi_line_number(const vgi_lines *t, const vgi_line *l, size_t field, double 
 {
     const vgi_field *f = &l->at[field];
     if (vgi_field_number(f, x)) return VG_OK;
-    return vg_fail(e, VG_EINPUT, "%s line %zu: '%.*s' is no number", t->subject, l->number, shown(f), f->begin);
+    return vg_fail(e, VG_EINPUT, "%s line %zu: '%.*s' is not a number", t->subject, l->number, shown_length(f), f->begin);
 }
 
 int vgi_line_name(const vgi_lines *t, const vgi_line *l, size_t field, char **name, vg_err *e)

@@ -86,13 +86,13 @@ int vg_seeds_read(vg_seed **seeds, size_t *n, const void *data, size_t bytes, in
         if (has_none(&l)) continue;
         if (l.n != 7)
             r = vg_fail(e, VG_EINPUT,
-                        "%s line %zu: a point is 'VERTEX A B C WA WB WC', or 'VERTEX -' where there is none", subject,
+                        "%s line %zu: a point is 'VERTEX A B C WA WB WC', or 'VERTEX -' for none", subject,
                         l.number);
         if (r == VG_OK) r = vgi_grow(seeds, &cap, *n + 1, sizeof **seeds, e);
         if (r == VG_OK) r = take_seed(&t, &l, base, &(*seeds)[*n], e);
         if (r == VG_OK) ++*n;
     }
-    if (r == VG_OK && *n == 0) r = vg_fail(e, VG_EINPUT, "'%s' gives no point of any vertex", name);
+    if (r == VG_OK && *n == 0) r = vg_fail(e, VG_EINPUT, "'%s' gives no points", name);
     if (r < 0) free(*seeds), *seeds = NULL, *n = 0;
     return r;
 }

@@ -37,7 +37,7 @@ static int find_texture(making *k, const char *name, int *number, vg_err *e)
     *number = -1;
     const char *type = read_image(k, name, &bytes) == VG_OK ? vgi_gltf_image_type(bytes.data, bytes.size) : NULL;
     if (!type || !strcmp(type, "image/webp") || !strcmp(type, "image/ktx2")) {
-        vgi_note(k->pack.note, "the image '%.60s' of its materials is not beside it, or no PNG or JPEG", name);
+        vgi_note(k->pack.note, "the image '%.60s' of its materials is missing, or is not PNG or JPEG", name);
         vg_bytes_clear(&bytes);
         return VG_OK;
     }
@@ -190,7 +190,7 @@ static int read_libraries(making *k, const vg_attributes *a, const char *path, v
     return r;
 }
 
-static int begin(making *k, vgi_json **asset, vg_err *e)
+static int begin_asset(making *k, vgi_json **asset, vg_err *e)
 {
     int r = vgi_gltf_pack_begin(&k->pack, e);
     if (r == VG_OK) r = vgi_json_put(k->pack.doc, "asset", *asset = vgi_json_object(e), e);
@@ -223,7 +223,7 @@ int vgi_take_materials(vg_body *b, const char *path, vg_note *note, vg_err *e)
     making k = {.pack.note = note};
     vgi_json *asset = NULL;
     if (!has_library(&b->attributes) || !b->mesh.nv) return VG_OK;
-    int r = begin(&k, &asset, e);
+    int r = begin_asset(&k, &asset, e);
     if (r == VG_OK) r = read_libraries(&k, &b->attributes, path, e);
     if (r == VG_OK && vgi_json_count(k.materials)) {
         if (!k.files.n) vgi_json_drop(k.pack.doc, "textures"), vgi_json_drop(k.pack.doc, "images");

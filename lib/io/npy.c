@@ -20,7 +20,7 @@ static void skip_blanks(struct text *t)
     while (t->p < t->end && (*t->p == ' ' || *t->p == '\t' || *t->p == '\n')) t->p++;
 }
 
-static bool take(struct text *t, char c)
+static bool take_character(struct text *t, char c)
 {
     skip_blanks(t);
     if (t->p == t->end || *t->p != c) return false;
@@ -68,11 +68,11 @@ static bool take_descr(struct text *t, vgi_npy *a)
 /* "(2, 3)", "(2,)", "()" */
 static bool take_shape(struct text *t, vgi_npy *a)
 {
-    if (!take(t, '(')) return false;
-    for (a->ndim = 0; !take(t, ')'); a->ndim++) {
+    if (!take_character(t, '(')) return false;
+    for (a->ndim = 0; !take_character(t, ')'); a->ndim++) {
         int64_t x;
-        if (a->ndim && !take(t, ',')) return false;
-        if (a->ndim && take(t, ')')) break;
+        if (a->ndim && !take_character(t, ',')) return false;
+        if (a->ndim && take_character(t, ')')) break;
         skip_blanks(t);
         const char *end = t->p < t->end && *t->p != '-' ? vgi_parse_int(t->p, t->end, &x) : NULL;
         if (!end || a->ndim == VGI_NPY_DIMENSIONS) return false;
@@ -89,16 +89,16 @@ static bool take_bool(struct text *t, bool *b)
     return *b || take_word(t, "False");
 }
 
-static bool parse(struct text *t, vgi_npy *a)
+static bool parse_header(struct text *t, vgi_npy *a)
 {
     bool descr = false, order = false, shape = false;
-    if (!take(t, '{')) return false;
-    while (!take(t, '}')) {
+    if (!take_character(t, '{')) return false;
+    while (!take_character(t, '}')) {
         const char *key;
         size_t n;
-        if ((descr || order || shape) && !take(t, ',')) return false;
-        if (take(t, '}')) break;
-        if (!take_string(t, &key, &n) || !take(t, ':')) return false;
+        if ((descr || order || shape) && !take_character(t, ',')) return false;
+        if (take_character(t, '}')) break;
+        if (!take_string(t, &key, &n) || !take_character(t, ':')) return false;
         if (n == 5 && !memcmp(key, "descr", 5) && !descr) descr = take_descr(t, a);
         else if (n == 13 && !memcmp(key, "fortran_order", 13) && !order) order = take_bool(t, &a->fortran);
         else if (n == 5 && !memcmp(key, "shape", 5) && !shape) shape = take_shape(t, a);
@@ -135,7 +135,7 @@ int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, 
     *a = (vgi_npy){0};
     int r = cut_short(vgi_input_read(in, head, 10, NULL, e), subject, e);
     if (r < 0) return r;
-    if (!sniff_npy(head, 10)) return vg_fail(e, VG_EINPUT, "%s is no NumPy array", subject);
+    if (!sniff_npy(head, 10)) return vg_fail(e, VG_EINPUT, "%s is not a NumPy array", subject);
     if (head[6] < 1 || head[6] > 3)
         return vg_fail(e, VG_EINPUT, "%s is a NumPy array of version %d: 1 to 3 are known", subject, head[6]);
     size_t n = head[8] | (size_t)head[9] << 8;
@@ -147,7 +147,7 @@ int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, 
     vg_bytes b = {0};
     r = cut_short(vgi_input_take(in, &b, n, NULL, e), subject, e);
     struct text t = {(const char *)b.data, b.data ? (const char *)b.data + b.size : NULL};
-    if (r == VG_OK && !(n && parse(&t, a)))
+    if (r == VG_OK && !(n && parse_header(&t, a)))
         r = vg_fail(e, VG_EINPUT, "%s: the header of the array is not supported: plain numbers or text, at "
                     "most %d dimensions", subject, VGI_NPY_DIMENSIONS);
     vg_bytes_clear(&b);
@@ -222,7 +222,7 @@ static int wrong_shape(const vgi_npy *a, const char *subject, vg_err *e)
     char shape[100] = "";
     for (size_t d = 0, n = 0; d < a->ndim; d++)
         n += (size_t)snprintf(shape + n, sizeof shape - n, d ? ", %llu" : "%llu", (unsigned long long)a->shape[d]);
-    return vg_fail(e, VG_EINPUT, "%s has shape (%s): positions are read, (frames, vertices, 3) or (vertices, 3)",
+    return vg_fail(e, VG_EINPUT, "%s has shape (%s): expected positions, (frames, vertices, 3) or (vertices, 3)",
                    subject, shape);
 }
 
@@ -268,7 +268,7 @@ static int open_npy(void **state, vg_head *h, vgi_input *in, const vg_reading *h
 }
 
 /* Returns 0 (end of sequence) if the file ends, too. */
-static int finish(reading *x, vg_err *e)
+static int finish_frames(reading *x, vg_err *e)
 {
     int r = vgi_input_ended(x->in, e);
     if (r != 0) return r < 0 ? r : 0;
@@ -280,7 +280,7 @@ static int next_npy(void *state, vg_frame *f, vg_err *e)
     reading *x = state;
     const vgi_npy *a = &x->a;
     int r;
-    if (x->next == x->frames) return finish(x, e);
+    if (x->next == x->frames) return finish_frames(x, e);
     if (!x->have_data && (r = take_data(x, e)) < 0) return r;
     size_t per_point = vgi_npy_stride(a, a->ndim - 2), per_axis = vgi_npy_stride(a, a->ndim - 1);
     size_t first = x->whole ? x->next * vgi_npy_stride(a, 0) : 0;

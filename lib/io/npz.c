@@ -108,7 +108,7 @@ static void list_array(reading *x, const char *path, const vg_bytes *data)
 }
 
 /* `in` is at an array that extends to its end. */
-static int hold(reading *x, enum array i, vgi_input *in, const char *subject, vg_err *e)
+static int hold_array(reading *x, enum array i, vgi_input *in, const char *subject, vg_err *e)
 {
     struct held *h = &x->held[i];
     size_t bytes;
@@ -134,11 +134,11 @@ static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_er
     list_array(x, path, data);
     if (i == ARRAYS) return VG_OK; /* a feature array of another program */
     snprintf(subject, sizeof subject, "array '%s' in %.150s", name, x->subject);
-    if (x->held[i].there && x->held[i].rank == rank) return vg_fail(e, VG_EINPUT, "%s is there twice", subject);
+    if (x->held[i].there && x->held[i].rank == rank) return vg_fail(e, VG_EINPUT, "%s is in the file twice", subject);
     if (x->held[i].there && x->held[i].rank < rank) return VG_OK;
     x->held[i].name = name, x->held[i].rank = rank;
     int r = vgi_input_memory(&in, data->data, data->size, path, e);
-    if (r == VG_OK) r = hold(x, i, in, subject, e);
+    if (r == VG_OK) r = hold_array(x, i, in, subject, e);
     vgi_input_free(&in);
     return r;
 }
@@ -164,7 +164,7 @@ static int hold_all(reading *x, vgi_input *in, vg_err *e)
 
 /* ---- shapes and elements ---- */
 
-static int wrong(const reading *x, enum array i, const char *what, vg_err *e)
+static int wrong_array(const reading *x, enum array i, const char *what, vg_err *e)
 {
     return vg_fail(e, VG_EINPUT, "array '%s' in %s %s", x->held[i].name, x->subject, what);
 }
@@ -175,7 +175,7 @@ static int wrong_shape(const reading *x, enum array i, const char *shape, vg_err
                    x->held[i].shape, shape);
 }
 
-static int missing(const reading *x, enum array i, enum array because, vg_err *e)
+static int missing_array(const reading *x, enum array i, enum array because, vg_err *e)
 {
     return vg_fail(e, VG_EINPUT, "%s has an array '%s', but none called '%s'", x->subject, x->held[because].name,
                    vgi_npz_names[i]);
@@ -217,7 +217,7 @@ static int copy_floats(const reading *x, enum array i, size_t from, size_t n, do
     const struct held *h = &x->held[i];
     for (size_t k = 0; k < n; k++) {
         to[k] = vgi_npy_float(&h->a, element(h, from + k));
-        if (!isfinite(to[k])) return wrong(x, i, "holds a number that is not finite", e);
+        if (!isfinite(to[k])) return wrong_array(x, i, "holds a number that is not finite", e);
     }
     return VG_OK;
 }
@@ -238,12 +238,12 @@ static int copy_indices(const reading *x, enum array i, uint64_t limit, uint32_t
     const struct held *h = &x->held[i];
     *list = NULL, *n = 0;
     if (!h->there) return VG_OK;
-    if ((h->a.kind != 'i' && h->a.kind != 'u') || h->a.item > 8) return wrong(x, i, "does not hold integers", e);
+    if ((h->a.kind != 'i' && h->a.kind != 'u') || h->a.item > 8) return wrong_array(x, i, "does not hold integers", e);
     *n = elements(h);
     if (!(*list = vgi_array_raw(*n, sizeof **list, e))) return VG_ENOMEM;
     for (size_t k = 0; k < *n; k++) {
         int64_t v = integer_at(h, k);
-        if (v < 0 || (uint64_t)v >= limit) return wrong(x, i, "holds an index that is out of range", e);
+        if (v < 0 || (uint64_t)v >= limit) return wrong_array(x, i, "holds an index that is out of range", e);
         (*list)[k] = (uint32_t)v;
     }
     return VG_OK;
@@ -252,7 +252,7 @@ static int copy_indices(const reading *x, enum array i, uint64_t limit, uint32_t
 static int check_ascending(const reading *x, enum array i, const uint32_t *list, size_t n, vg_err *e)
 {
     for (size_t k = 1; k < n; k++)
-        if (list[k] <= list[k - 1]) return wrong(x, i, "is not ascending", e);
+        if (list[k] <= list[k - 1]) return wrong_array(x, i, "is not ascending", e);
     return VG_OK;
 }
 
@@ -269,10 +269,10 @@ static int text_at(const reading *x, enum array i, size_t k, char **text, vg_err
         if (c == 0) break;
         if (step == 1) r = vgi_bytes_append(&b, p + at, 1, e);
         else if (c > 0x10ffff || (c >= 0xd800 && c < 0xe000))
-            r = wrong(x, i, "holds a letter that does not exist", e);
+            r = wrong_array(x, i, "holds an invalid code point", e);
         else r = vgi_append_letter(&b, c, e);
     }
-    if (r == VG_OK && !vgi_is_utf8((char *)b.data, b.size)) r = wrong(x, i, "holds text that is no UTF-8", e);
+    if (r == VG_OK && !vgi_is_utf8((char *)b.data, b.size)) r = wrong_array(x, i, "holds text that is not UTF-8", e);
     if (r == VG_OK && !(*text = vgi_copy_string((char *)b.data, b.size, e))) r = VG_ENOMEM;
     vg_bytes_clear(&b);
     return r;
@@ -330,16 +330,16 @@ static int named_axes(reading *x, struct held *h, const char *axes, vg_err *e)
     for (int k = 0; k < 3; k++) {
         const char *at = strchr(axes, letters[k]);
         if (!at || strlen(axes) != 3)
-            return vg_fail(e, VG_EARG, "'%.20s' are no axes: an order of f (frames), v (vertices) and x (x y z)", axes);
+            return vg_fail(e, VG_EARG, "'%.20s' are not axes: give an order of f (frames), v (vertices) and x (x y z)", axes);
         axis[k] = (int)(at - axes);
     }
-    if (h->a.ndim != 3) return wrong(x, POSITIONS, "has not the three axes that were named", e);
+    if (h->a.ndim != 3) return wrong_array(x, POSITIONS, "does not have the three axes given", e);
     order_axes(h, axis);
     return VG_OK;
 }
 
 /* 0: these axes cannot be frames, vertices, xyz; 1: they can; 2: the number of vertices is the required one. */
-static int suits(const uint64_t *shape, const int axis[3], size_t wanted, bool exact)
+static int axes_suit(const uint64_t *shape, const int axis[3], size_t wanted, bool exact)
 {
     const uint64_t nv = shape[axis[1]];
     if (shape[axis[2]] != 3 || nv < wanted || (exact && nv != wanted)) return 0;
@@ -355,16 +355,15 @@ static int find_axes(reading *x, struct held *h, vg_err *e)
     int best = 0, score = 0, equals = 0;
     if (h->a.ndim != 3) return VG_OK;
     wanted = vertices_wanted(x, &exact);
-    if (suits(h->a.shape, orders[0], wanted, exact)) return VG_OK;
+    if (axes_suit(h->a.shape, orders[0], wanted, exact)) return VG_OK;
     for (int i = 1; i < 6; i++) {
-        int s = suits(h->a.shape, orders[i], wanted, exact);
+        int s = axes_suit(h->a.shape, orders[i], wanted, exact);
         equals = s == score ? equals + 1 : s > score ? 1 : equals;
         if (s > score) best = i, score = s;
     }
     if (score == 0) return VG_OK;
     if (equals > 1)
-        return wrong(x, POSITIONS, "has axes that cannot be told apart: name them with --array-axes (vxf: vertices, "
-                     "x y z, frames)", e);
+        return wrong_array(x, POSITIONS, "has ambiguous axes: name them with --array-axes (vxf: vertices, x y z, frames)", e);
     order_axes(h, orders[best]);
     return VG_OK;
 }
@@ -386,7 +385,7 @@ static int choose_values(reading *x, vg_head *h, const vg_reading *how, vg_err *
     vgi_npy *a = &v->a;
     x->width = vg_kind_width(kinds[found]);
     if (!is_float(v))
-        return wrong(x, x->values, "holds no binary32 or binary64 numbers: store it as float32 or float64", e);
+        return wrong_array(x, x->values, "holds no binary32 or binary64 numbers: store it as float32 or float64", e);
     if (x->values == POSITIONS) {
         int r = how->array_axes ? named_axes(x, v, how->array_axes, e) : find_axes(x, v, e);
         if (r < 0) return r;
@@ -403,7 +402,7 @@ static int choose_values(reading *x, vg_head *h, const vg_reading *how, vg_err *
                            : x->width == 3               ? "(frames, elements, 3)"
                                                          : "(frames, elements, 4)",
                            e);
-    if (a->shape[0] == 0) return wrong(x, x->values, "holds no frame", e);
+    if (a->shape[0] == 0) return wrong_array(x, x->values, "holds no frame", e);
     x->frames = (size_t)a->shape[0], x->count = (size_t)a->shape[1];
     h->kind = kinds[found], h->count = x->count;
     h->precision = a->item == 4 ? VG_F32 : VG_F64;
@@ -416,9 +415,9 @@ static int take_reference(reading *x, vg_head *h, vg_err *e)
     bool vertices = h->kind == VG_VERTICES || h->kind == VG_FEATURES;
     const uint64_t shape[2] = {vertices ? x->count : UINT64_MAX, 3};
     h->body.mesh.nv = x->count;
-    if (!given->there) return h->kind == VG_VERTICES ? VG_OK : missing(x, REFERENCE, x->values, e);
+    if (!given->there) return h->kind == VG_VERTICES ? VG_OK : missing_array(x, REFERENCE, x->values, e);
     if (!is_float(given) || !has_shape(given, 2, shape) || given->a.shape[0] == 0 || given->a.shape[0] >= UINT32_MAX - 1)
-        return wrong(x, REFERENCE, "is not of shape (vertices, 3) with float32 or float64", e);
+        return wrong_array(x, REFERENCE, "is not of shape (vertices, 3) with float32 or float64", e);
     h->body.mesh.nv = (size_t)given->a.shape[0];
     h->body.reference = vgi_array_raw(h->body.mesh.nv, 3 * sizeof *h->body.reference, e);
     int r = h->body.reference ? copy_floats(x, REFERENCE, 0, 3 * h->body.mesh.nv, h->body.reference, e)
@@ -426,7 +425,7 @@ static int take_reference(reading *x, vg_head *h, vg_err *e)
     const struct held *name = &x->held[REFERENCE_NAME];
     if (r < 0 || !name->there) return r;
     if ((name->a.kind != 'U' && name->a.kind != 'S') || elements(name) != 1)
-        return wrong(x, REFERENCE_NAME, "is not one text", e);
+        return wrong_array(x, REFERENCE_NAME, "is not one text", e);
     return text_at(x, REFERENCE_NAME, 0, &h->body.reference_name, e);
 }
 
@@ -435,13 +434,13 @@ static int take_polygons(reading *x, vg_head *h, vg_err *e)
 {
     size_t n, corners;
     vg_mesh *m = &h->body.mesh;
-    if (!x->held[FACE_VERTICES].there) return missing(x, FACE_VERTICES, FACE_OFFSETS, e);
-    if (!x->held[FACE_OFFSETS].there) return missing(x, FACE_OFFSETS, FACE_VERTICES, e);
+    if (!x->held[FACE_VERTICES].there) return missing_array(x, FACE_VERTICES, FACE_OFFSETS, e);
+    if (!x->held[FACE_OFFSETS].there) return missing_array(x, FACE_OFFSETS, FACE_VERTICES, e);
     int r = copy_indices(x, FACE_OFFSETS, UINT32_MAX, &m->start, &n, e);
     if (r == VG_OK) r = copy_indices(x, FACE_VERTICES, m->nv, &m->vert, &corners, e);
     if (r < 0) return r;
     if (n == 0 || m->start[0] != 0 || m->start[n - 1] != corners)
-        return wrong(x, FACE_OFFSETS, "does not begin with 0 and end with the length of 'face_vertices'", e);
+        return wrong_array(x, FACE_OFFSETS, "does not begin with 0 and end with the length of 'face_vertices'", e);
     if ((r = check_ascending(x, FACE_OFFSETS, m->start, n, e)) < 0) return r;
     m->nf = n - 1;
     return VG_OK;
@@ -454,11 +453,11 @@ static int take_equal_faces(reading *x, vg_head *h, vg_err *e)
     size_t corners;
     vg_mesh *m = &h->body.mesh;
     if (x->held[FACE_OFFSETS].there)
-        return wrong(x, FACES, "is there beside 'face_offsets': faces are told by one of them", e);
+        return wrong_array(x, FACES, "is given in addition to 'face_offsets': only one of them may define faces", e);
     if (f->a.ndim != 2 || f->a.shape[1] < 2) return wrong_shape(x, FACES, "(faces, corners of a face)", e);
     int r = copy_indices(x, FACES, m->nv, &m->vert, &corners, e);
     if (r < 0) return r;
-    if (corners >= UINT32_MAX || f->a.shape[0] >= UINT32_MAX) return wrong(x, FACES, "is too long", e);
+    if (corners >= UINT32_MAX || f->a.shape[0] >= UINT32_MAX) return wrong_array(x, FACES, "is too long", e);
     size_t nf = (size_t)f->a.shape[0];
     if (!(m->start = vgi_array_raw(nf + 1, sizeof *m->start, e))) return VG_ENOMEM;
     for (size_t i = 0; i <= nf; i++) m->start[i] = (uint32_t)(i * (size_t)f->a.shape[1]);
@@ -470,20 +469,20 @@ static int take_faces(reading *x, vg_head *h, vg_err *e)
 {
     if (x->held[FACES].there) return take_equal_faces(x, h, e);
     if (x->held[FACE_OFFSETS].there || x->held[FACE_VERTICES].there) return take_polygons(x, h, e);
-    return h->kind == VG_VERTICES ? VG_OK : missing(x, FACE_OFFSETS, x->values, e);
+    return h->kind == VG_VERTICES ? VG_OK : missing_array(x, FACE_OFFSETS, x->values, e);
 }
 
 static int take_links(reading *x, vg_head *h, vg_err *e)
 {
     static const uint64_t pairs[2] = {UINT64_MAX, 2};
-    if (!x->held[LINKS].there) return missing(x, LINKS, x->values, e);
+    if (!x->held[LINKS].there) return missing_array(x, LINKS, x->values, e);
     if (!has_shape(&x->held[LINKS], 2, pairs)) return wrong_shape(x, LINKS, "(links, 2)", e);
     h->links.chosen = true;
     size_t n;
     int r = copy_indices(x, LINKS, h->body.mesh.nv, &h->links.pairs, &n, e);
     h->links.n = n / 2;
     for (size_t i = 0; r == VG_OK && i < h->links.n; i++)
-        if (h->links.pairs[2 * i] == h->links.pairs[2 * i + 1]) return wrong(x, LINKS, "joins a vertex to itself", e);
+        if (h->links.pairs[2 * i] == h->links.pairs[2 * i + 1]) return wrong_array(x, LINKS, "joins a vertex to itself", e);
     return r;
 }
 
@@ -503,12 +502,12 @@ static int take_graph(reading *x, vg_head *h, vg_err *e)
     if (r < 0) return r;
     x->nanchors = h->nanchors;
     const uint64_t places[3] = {x->frames, h->nanchors, 3};
-    if (h->nanchors && !x->held[ANCHOR_POSITIONS].there) return missing(x, ANCHOR_POSITIONS, ANCHORS, e);
+    if (h->nanchors && !x->held[ANCHOR_POSITIONS].there) return missing_array(x, ANCHOR_POSITIONS, ANCHORS, e);
     if (h->nanchors && (!is_float(&x->held[ANCHOR_POSITIONS]) || !has_shape(&x->held[ANCHOR_POSITIONS], 3, places)))
-        return wrong(x, ANCHOR_POSITIONS, "is not of shape (frames, anchors, 3) with float32 or float64", e);
-    if (!x->held[ROOTS].there) return missing(x, ROOTS, x->values, e);
+        return wrong_array(x, ANCHOR_POSITIONS, "is not of shape (frames, anchors, 3) with float32 or float64", e);
+    if (!x->held[ROOTS].there) return missing_array(x, ROOTS, x->values, e);
     if (!is_float(&x->held[ROOTS]) || !has_shape(&x->held[ROOTS], 2, roots))
-        return wrong(x, ROOTS, "is not of shape (frames, 3) with float32 or float64", e);
+        return wrong_array(x, ROOTS, "is not of shape (frames, 3) with float32 or float64", e);
     vg_graph *g;
     if ((r = vg_head_graph(&g, h, e)) < 0) return r;
     size_t corners = vg_graph_corners(g);
@@ -526,9 +525,9 @@ static int check_features(reading *x, const vg_head *h, vg_err *e)
     int r = vg_mesh_check(&h->body.mesh, x->subject, e);
     if (r < 0) return r;
     if (t->there && (!is_float(t) || !has_shape(t, 2, turns)))
-        return wrong(x, ROOT_TURNS, "is not of shape (frames, 4) with float32 or float64", e);
+        return wrong_array(x, ROOT_TURNS, "is not of shape (frames, 4) with float32 or float64", e);
     if (c->there && (!is_float(c) || !has_shape(c, 3, centroids) || c->a.shape[1] == 0))
-        return wrong(x, CENTROIDS, "is not of shape (frames, components, 3) with float32 or float64", e);
+        return wrong_array(x, CENTROIDS, "is not of shape (frames, components, 3) with float32 or float64", e);
     return VG_OK;
 }
 
@@ -537,9 +536,9 @@ static int check_labels(const reading *x, vg_err *e)
     const uint64_t shape[1] = {x->frames};
     const struct held *names = &x->held[NAMES], *times = &x->held[TIMES];
     if (names->there && ((names->a.kind != 'U' && names->a.kind != 'S') || !has_shape(names, 1, shape)))
-        return wrong(x, NAMES, "is not a list of texts, one for each frame", e);
+        return wrong_array(x, NAMES, "is not a list of texts, one for each frame", e);
     if (times->there && (!is_float(times) || !has_shape(times, 1, shape)))
-        return wrong(x, TIMES, "is not of shape (frames) with float32 or float64", e);
+        return wrong_array(x, TIMES, "is not of shape (frames) with float32 or float64", e);
     return VG_OK;
 }
 
@@ -577,7 +576,7 @@ static int check_quaternions(const reading *x, const double *q, vg_err *e)
 {
     for (size_t i = 0; x->values == DEFORMATIONS && i < x->count; i++, q += 4)
         if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
-            return wrong(x, x->values, "holds a quaternion that is zero", e);
+            return wrong_array(x, x->values, "holds a quaternion that is zero", e);
     return VG_OK;
 }
 

@@ -231,7 +231,7 @@ static bool belongs(const writing *x, enum array i)
     }
 }
 
-static int add(writing *x, enum array i, vg_err *e)
+static int write_member(writing *x, enum array i, vg_err *e)
 {
     const vg_head *h = x->h;
     const uint64_t places[3] = {x->frames, h->nanchors, 3}, roots[2] = {x->frames, 3}, links[2] = {h->links.n, 2};
@@ -261,7 +261,7 @@ int vgi_npz_end(void *state, vg_err *e)
 {
     writing *x = state;
     int r = vgi_packer_open_plain(&x->packer, x->out->fd, x->out->name, e);
-    for (int i = 0; i < ARRAYS && r == VG_OK; i++) r = add(x, (enum array)i, e);
+    for (int i = 0; i < ARRAYS && r == VG_OK; i++) r = write_member(x, (enum array)i, e);
     if (r == VG_OK) r = vgi_packer_end(x->packer, e);
     if (r < 0) return r;
     off_t size = lseek(x->out->fd, 0, SEEK_END);

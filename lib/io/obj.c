@@ -534,7 +534,7 @@ static int finish_tex(struct reading *in)
     pack_tex(a, number_of);
     size_t missing = a->corner_tex ? renumber_tex(in, number_of, n) : 0;
     free(number_of);
-    if (in->bad_tex) vgi_note(&in->m->note, "left out %zu texture coordinates that are no finite numbers", in->bad_tex);
+    if (in->bad_tex) vgi_note(&in->m->note, "left out %zu texture coordinates that are not finite numbers", in->bad_tex);
     if (missing) vgi_note(&in->m->note, "%zu corners name texture coordinates that are not there", missing);
     if (a->ntex) return VG_OK;
     free(a->tex);

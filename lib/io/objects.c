@@ -114,8 +114,8 @@ static int take_objects(reading *x, vg_head *h, const char *subject, vg_err *e)
 {
     vg_model *m = &x->m;
     if (!(x->frames = vgi_obj_frames(m)))
-        return vg_fail(e, VG_EINPUT, "%s is no sequence of objects: each 'o' must have as many vertices as the first, and "
-                                     "the same faces",
+        return vg_fail(e, VG_EINPUT, "%s is not a sequence of objects: each 'o' must have as many vertices as the "
+                                     "first, and the same faces",
                        subject);
     int r = keep_names(x, e);
     if (r < 0) return r;

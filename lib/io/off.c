@@ -115,11 +115,12 @@ static int read_header(struct reading *in, size_t *nv, size_t *nf)
     size_t n = find_word(in) ? keyword(in->p, in->end) : 0, edges;
     if (n == 0 && (in->p == in->end || *in->p < '0' || *in->p > '9')) return fail_here(in, "OFF");
     if (memchr(in->p, 'n', n) || memchr(in->p, '4', n))
-        return vg_fail(in->e, VG_EINPUT, "%s is %.*s, with vertices of other than 3 coordinates, which is not read",
+        return vg_fail(in->e, VG_EINPUT, "%s is %.*s, whose vertices do not have 3 coordinates, which is not "
+                                         "supported",
                        in->subject, (int)n, in->p);
     in->p += n;
     if (line_goes_on(in) && in->end - in->p >= 6 && !memcmp(in->p, "BINARY", 6))
-        return vg_fail(in->e, VG_EINPUT, "%s is binary OFF, which is not read: write it as text", in->subject);
+        return vg_fail(in->e, VG_EINPUT, "%s is binary OFF, which is not supported: write it as text", in->subject);
     int r = read_count(in, nv);
     if (r == VG_OK) r = read_count(in, nf);
     if (r == VG_OK && (in->bare_faces || line_goes_on(in))) r = read_count(in, &edges);
@@ -194,11 +195,11 @@ static int read_elements(struct reading *in, size_t nv, size_t nf)
 }
 
 /* Refuse data after the last element. */
-static int finish(struct reading *in)
+static int check_end(struct reading *in)
 {
     if (!find_word(in)) return VG_OK;
     if (in->bare_vertices) return fail_here(in, "the end of the file");
-    vgi_note(&in->m->note, "left out what stands behind the last face, from line %zu on", line_of(in, in->p));
+    vgi_note(&in->m->note, "left out data after the last face, from line %zu on", line_of(in, in->p));
     return VG_OK;
 }
 
@@ -216,7 +217,7 @@ static int read_as(vg_model *m, int bare, const char *data, size_t n, const char
     m->mesh.start[0] = 0;
     m->mesh.nv = nv;
     r = read_elements(&in, nv, nf);
-    return r == VG_OK ? finish(&in) : r;
+    return r == VG_OK ? check_end(&in) : r;
 }
 
 static int read_off(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)

@@ -102,7 +102,7 @@ static int open_packer(vgi_packer **out, int fd, const char *name, size_t n, con
     int r = VG_OK;
     if (!p->name || !p->entry || !p->la) r = vg_fail(e, VG_ENOMEM, "not enough memory to write '%.*s'", (int)n, name);
     else if (!k)
-        r = vg_fail(e, VG_EARG, "'%s' is no archive that can be written: %s can", p->name, vgi_packer_suffixes());
+        r = vg_fail(e, VG_EARG, "'%s' is not an archive that can be written: %s can", p->name, vgi_packer_suffixes());
     if (r == VG_OK && k) {
         locale_t before = vgi_enter_utf8(p->utf8);
         bool ok = configure(p->la, k) == ARCHIVE_OK &&

@@ -20,7 +20,7 @@ static const char *refuse_form(const vg_head *h)
     if (h->map.ncorners && h->map.ncorners != vg_head_elements(h, VG_OF_CORNER))
         return "the corners of record MAP do not fit the mesh";
     if (h->map.n && h->map.kind == VG_MAP_PATCHES && h->map.n != h->body.patches.n)
-        return "record MAP has not as many patches as record PTCH";
+        return "records MAP and PTCH have different numbers of patches";
     if (h->signal.n && h->signal.space != VG_SPACE_VERTICES && !h->links.chosen)
         return "record SIGN needs a LINK record";
     if (vg_head_width(h) == 0) return "its elements have no width";

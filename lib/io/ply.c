@@ -53,7 +53,7 @@ static bool word_is(struct word w, const char *text)
     return strlen(text) == w.n && !memcmp(w.at, text, w.n);
 }
 
-static int shown(struct word w)
+static int shown_length(struct word w)
 {
     return w.n > SHOWN ? SHOWN : (int)w.n;
 }
@@ -97,7 +97,7 @@ static int read_encoding(struct reading *in, const struct word *words, size_t n)
     in->text = word_is(words[1], "ascii");
     in->swap = word_is(words[1], "binary_big_endian");
     if (in->text || in->swap || word_is(words[1], "binary_little_endian")) return VG_OK;
-    return vg_fail(in->e, VG_EINPUT, "%s: unknown PLY format '%.*s'", in->subject, shown(words[1]), words[1].at);
+    return vg_fail(in->e, VG_EINPUT, "%s: unknown PLY format '%.*s'", in->subject, shown_length(words[1]), words[1].at);
 }
 
 static int read_element_line(struct reading *in, const struct word *words, size_t n)
@@ -113,7 +113,7 @@ static int read_element_line(struct reading *in, const struct word *words, size_
     if (vgi_grow(&in->elements, &in->elements_cap, in->nelements + 1, sizeof *in->elements, in->e) < 0) return VG_ENOMEM;
     struct element *el = &in->elements[in->nelements++];
     *el = (struct element){.count = (uint64_t)count, .first = in->nproperties};
-    memcpy(el->name, words[1].at, (size_t)shown(words[1]));
+    memcpy(el->name, words[1].at, (size_t)shown_length(words[1]));
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         if (word_is(words[1], kinds[i].name)) el->kind = kinds[i].kind;
     if (el->kind == VERTEX && in->has_vertices)
@@ -160,10 +160,10 @@ static int read_property_line(struct reading *in, const struct word *words, size
     struct element *el = &in->elements[in->nelements - 1];
     struct property p = {list ? type_named(words[2]) : NO_TYPE, type_named(type), role_named(el->kind, name, list)};
     if (p.item == NO_TYPE || (list && p.count == NO_TYPE))
-        return vg_fail(in->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", in->subject, shown(name),
+        return vg_fail(in->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", in->subject, shown_length(name),
                        name.at);
     if (p.role && has_role(in, el, p.role))
-        return vg_fail(in->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", in->subject, el->name, shown(name),
+        return vg_fail(in->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", in->subject, el->name, shown_length(name),
                        name.at);
     if (vgi_grow(&in->properties, &in->properties_cap, in->nproperties + 1, sizeof *in->properties, in->e) < 0)
         return VG_ENOMEM;
@@ -213,7 +213,7 @@ static int read_header(struct reading *in)
         else strange++; /* a comment broken in two, as old versions of Blender wrote their file name */
         if (r < 0) return r;
     }
-    if (strange) vgi_note(&in->m->note, "left out %zu lines of the PLY header that mean nothing", strange);
+    if (strange) vgi_note(&in->m->note, "left out %zu meaningless lines of the PLY header", strange);
     if (!formatted) return vg_fail(in->e, VG_EINPUT, "%s: the PLY header has no format line", in->subject);
     for (size_t i = 0; i < in->nelements; i++) {
         int r = finish_element(in, &in->elements[i]);
@@ -244,11 +244,11 @@ static int fail_word(struct reading *in, const struct element *el, uint64_t i, s
     if (w.n == 0)
         return vg_fail(in->e, VG_ETRUNC, "%s ends in %s %llu of %llu", in->subject, el->name, (unsigned long long)i,
                        (unsigned long long)el->count);
-    return vg_fail(in->e, VG_EINPUT, "%s: '%.*s' in %s %llu is no number that fits there", in->subject, shown(w), w.at,
+    return vg_fail(in->e, VG_EINPUT, "%s: '%.*s' in %s %llu is not a valid number", in->subject, shown_length(w), w.at,
                    el->name, (unsigned long long)i);
 }
 
-static inline uint64_t load(const char *p, size_t bytes, bool swap)
+static inline uint64_t load_bits(const char *p, size_t bytes, bool swap)
 {
     const unsigned char *u = (const unsigned char *)p;
     switch (bytes) {
@@ -261,7 +261,7 @@ static inline uint64_t load(const char *p, size_t bytes, bool swap)
 
 static inline int64_t integer_at(const char *p, enum type t, bool swap)
 {
-    uint64_t x = load(p, type_bytes[t], swap);
+    uint64_t x = load_bits(p, type_bytes[t], swap);
     switch (t) {
     case I8: return (int8_t)x;
     case I16: return (int16_t)x;
@@ -272,8 +272,8 @@ static inline int64_t integer_at(const char *p, enum type t, bool swap)
 
 static inline double number_at(const char *p, enum type t, bool swap)
 {
-    if (t == F32) return vgi_as_float((uint32_t)load(p, 4, swap));
-    if (t == F64) return vgi_as_double(load(p, 8, swap));
+    if (t == F32) return vgi_as_float((uint32_t)load_bits(p, 4, swap));
+    if (t == F64) return vgi_as_double(load_bits(p, 8, swap));
     return (double)integer_at(p, t, swap);
 }
 
@@ -290,7 +290,7 @@ static int read_whole(struct reading *in, enum type t, const struct element *el,
         return fail_word(in, el, i, w);
     }
     if (!(fabs(value) <= 9e15) || value != floor(value))
-        return vg_fail(in->e, VG_EINPUT, "%s: a number in %s %llu should be whole and is %g", in->subject, el->name,
+        return vg_fail(in->e, VG_EINPUT, "%s: a number in %s %llu should be an integer but is %g", in->subject, el->name,
                        (unsigned long long)i, value);
     *x = (int64_t)value;
     return VG_OK;
@@ -557,7 +557,7 @@ static int read_body(struct reading *in)
     }
     while (in->text && in->p < in->end && is_space(*in->p)) in->p++;
     if (in->p < in->end)
-        vgi_note(&in->m->note, "left out %zu bytes behind the last element", (size_t)(in->end - in->p));
+        vgi_note(&in->m->note, "left out %zu bytes after the last element", (size_t)(in->end - in->p));
     if (in->m->mesh.nv == 0) return vg_fail(in->e, VG_EINPUT, "%s has no vertices", in->subject);
     return VG_OK;
 }

@@ -17,7 +17,7 @@ struct writing {
     vg_err *e;
 };
 
-static void put(char **to, uint64_t x, size_t bytes, enum encoding encoding)
+static void put_bits(char **to, uint64_t x, size_t bytes, enum encoding encoding)
 {
     for (size_t i = 0; i < bytes; i++) (*to)[encoding == BIG ? bytes - 1 - i : i] = (char)(x >> 8 * i);
     *to += bytes;
@@ -26,7 +26,7 @@ static void put(char **to, uint64_t x, size_t bytes, enum encoding encoding)
 static void put_integer(char **to, uint64_t x, size_t bytes, enum encoding encoding, char separator)
 {
     if (encoding != TEXT) {
-        put(to, x, bytes, encoding);
+        put_bits(to, x, bytes, encoding);
         return;
     }
     *to += vgi_print_uint(*to, x);
@@ -39,9 +39,9 @@ static void put_number(char **to, double x, bool full, enum encoding encoding, c
         *to += full ? vgi_print_double(*to, x) : vgi_print_float(*to, x);
         *(*to)++ = separator;
     } else if (full) {
-        put(to, vgi_double_bits(x), 8, encoding);
+        put_bits(to, vgi_double_bits(x), 8, encoding);
     } else {
-        put(to, vgi_float_bits((float)x), 4, encoding);
+        put_bits(to, vgi_float_bits((float)x), 4, encoding);
     }
 }
 
@@ -87,7 +87,7 @@ static int write_header(struct writing *x)
 }
 
 /* Reserve room for n numbers of at most `most` bytes; returns its address. NULL: out of memory. */
-static char *room(struct writing *x, size_t n, size_t most)
+static char *reserve_text(struct writing *x, size_t n, size_t most)
 {
     if (vgi_bytes_reserve(x->out, x->out->size + n * most, x->e) < 0) return NULL;
     return (char *)x->out->data + x->out->size;
@@ -102,7 +102,7 @@ static int write_vertices(struct writing *x)
 {
     const vg_mesh *m = x->w->mesh;
     for (size_t v = 0; v < m->nv; v++) {
-        char *to = room(x, 3, MOST_NUMBER);
+        char *to = reserve_text(x, 3, MOST_NUMBER);
         if (!to) return VG_ENOMEM;
         for (int k = 0; k < 3; k++)
             put_number(&to, x->w->vertices[3 * v + k], x->w->full_precision, x->encoding, k < 2 ? ' ' : '\n');
@@ -117,7 +117,7 @@ static int write_faces(struct writing *x)
     for (size_t f = 0; f < m->nf; f++) {
         uint32_t first = m->start[f], end = m->start[f + 1];
         bool coloured = f < x->nfaces && has_colours(x);
-        char *to = room(x, (size_t)(end - first) + 4, MOST_NUMBER);
+        char *to = reserve_text(x, (size_t)(end - first) + 4, MOST_NUMBER);
         if (!to) return VG_ENOMEM;
         if (f < x->nfaces) put_integer(&to, end - first, x->long_list ? 4 : 1, x->encoding, ' ');
         for (uint32_t c = first; c < end; c++)

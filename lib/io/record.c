@@ -49,7 +49,7 @@ int vgi_record_begin_read(vgi_input *in, vg_err *e)
     int r = vgi_input_read(in, h, sizeof h, &got, e);
     if (r == VG_ETRUNC && got == 0)
         return vg_fail(e, VG_ETRUNC, "'%s' is empty: did the program before it fail?", name);
-    if (got >= 4 && memcmp(h, magic, 4)) return vg_fail(e, VG_EINPUT, "'%s' is no vg stream", name);
+    if (got >= 4 && memcmp(h, magic, 4)) return vg_fail(e, VG_EINPUT, "'%s' is not a vg stream", name);
     if (got >= 7 && memcmp(h, magic, 7))
         return vg_fail(e, VG_EINPUT, "'%s' was damaged by a transfer that changes line ends", name);
     if (r < 0) return r == VG_ETRUNC ? vg_fail(e, r, "'%s' ends inside the stream's first 16 bytes", name) : r;
@@ -79,7 +79,7 @@ static int check_end(vgi_input *in, const vgi_tally *t, const vg_record *record,
     if (record->payload.size != END_PAYLOAD) return vg_fail(e, VG_EINPUT, "'%s': the END record has a wrong length", name);
     uint64_t count = vgi_get64(record->payload.data);
     if (count != t->records)
-        return vg_fail(e, VG_EINPUT, "'%s': the END mark counts %llu records, %llu came", name,
+        return vg_fail(e, VG_EINPUT, "'%s': the END mark states %llu records, but there were %llu", name,
                        (unsigned long long)count, (unsigned long long)t->records);
     if (vgi_get64(record->payload.data + 8) != XXH64_digest(t->sum))
         return vg_fail(e, VG_EINPUT, "'%s': the END mark's checksum is wrong: records were changed or moved", name);

@@ -50,7 +50,7 @@ static int find_beside(const char *file, const char *suffix, char **path, vg_err
 
 int vgi_different_count(const vg_head *h, const char *subject, size_t nv, const char *mesh, vg_err *e)
 {
-    return vg_fail(e, VG_EINPUT, "%s has %zu points where %s has %zu vertices", subject, h->body.mesh.nv, mesh, nv);
+    return vg_fail(e, VG_EINPUT, "%s has %zu points, but %s has %zu vertices", subject, h->body.mesh.nv, mesh, nv);
 }
 
 static int borrow_mesh(const vgi_playing *p, vg_head *h, const char *path, vg_err *e)

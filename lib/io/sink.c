@@ -173,8 +173,8 @@ static int keep_mesh(const vg_sink *s, vg_err *e)
     vg_head_clear(&there);
     if (same) return VG_OK;
     return vg_fail(e, VG_EARG,
-                   "'%s', which goes with '%s', is there already and is not the reference pose: choose where "
-                   "the mesh goes with --mesh, or --no-mesh",
+                   "'%s', the mesh for '%s', exists and is not the reference pose: choose another file with --mesh, "
+                   "or use --no-mesh",
                    s->mesh, s->output);
 }
 
@@ -356,14 +356,13 @@ static int more_than_one(const vg_sink *s, vg_err *e)
 {
     if (s->plan.to_stdout)
         return vg_fail(e, VG_EARG,
-                       "more than one pose does not fit onto standard output: name a pattern like 'pose-%%04d.obj', "
-                       "a directory or an archive");
+                       "standard output takes one pose: use a pattern like 'pose-%%04d.obj', a directory or an "
+                       "archive");
     const char *suffix = s->plan.format->suffix;
     size_t n = s->plan.length;
     if (vgi_has_suffix(s->output, n, suffix)) n -= strlen(suffix);
     return vg_fail(e, VG_EARG,
-                   "more than one pose does not fit into '%s': use a pattern like '%.*s-%%04d%s', a directory or an "
-                   "archive",
+                   "'%s' takes one pose: use a pattern like '%.*s-%%04d%s', a directory or an archive",
                    s->output, (int)n, s->output, suffix);
 }
 
@@ -589,7 +588,7 @@ static const char *place_name(const vg_sink *s)
 
 static int no_pose(const vg_sink *s, vg_err *e)
 {
-    return vg_fail(e, VG_EINPUT, "there is no pose to be written to '%s'", s->output);
+    return vg_fail(e, VG_EINPUT, "there is no pose to write to '%s'", s->output);
 }
 
 /* Copy the collected bytes to the pipe. */

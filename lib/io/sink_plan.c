@@ -128,7 +128,7 @@ static int check_mesh_option(const vgi_plan *p, const vg_sink_options *o, vg_err
     if (!o->mesh && !o->no_mesh) return VG_OK;
     if (o->mesh && o->no_mesh) return vg_fail(e, VG_EARG, "--mesh and --no-mesh exclude each other");
     if (!vgi_plan_lacks_faces(p))
-        return vg_fail(e, VG_EARG, "'%.*s' holds its faces itself: leave out %s", (int)p->length, p->name,
+        return vg_fail(e, VG_EARG, "'%.*s' contains the faces: leave out %s", (int)p->length, p->name,
                        o->mesh ? "--mesh" : "--no-mesh");
     const vgi_format *f = o->mesh ? vgi_format_by_suffix(o->mesh) : NULL;
     if (o->mesh && !(f && f->keeps & VGI_KEEPS_ORDER))
@@ -146,8 +146,8 @@ static int check_gltf_options(const vgi_plan *p, const char *output, const vg_si
                                                  : NULL;
     if (p->sequence == &vgi_sequence_glb || p->sequence == &vgi_sequence_gltf)
         return o->shapes && (o->most_targets || o->morph_tolerance > 0 || o->name)
-                   ? vg_fail(e, VG_EARG, "--shapes writes each frame as it is, and no animation: leave out "
-                             "--max-targets, --morph-tolerance and --name")
+                   ? vg_fail(e, VG_EARG, "--shapes writes each frame unchanged, without an animation: leave out "
+                                         "--max-targets, --morph-tolerance and --name")
                    : VG_OK;
     if (given) return vg_fail(e, VG_EARG, "%s is for GLB and glTF: '%s' has no morph targets", given, output);
     return o->name ? vg_fail(e, VG_EARG, "--name is for GLB and glTF: '%s' has no animation to name", output) : VG_OK;
@@ -214,7 +214,7 @@ int vgi_plan_check_head(const vgi_plan *p, const vg_head *h, const char *output,
 {
     const vgi_sequence_format *f = p->sequence;
     if (f ? f->kinds >> h->kind & 1 : h->kind == VG_VERTICES) return f && f->check ? f->check(h, output, e) : VG_OK;
-    const char *advice = "make vertices of them with 'vg-play MAP' first, or of a rig's a skin in a .glb";
+    const char *advice = "convert them to vertices with 'vg-play MAP' first, or write those of a rig as a skin to a .glb";
     if (h->kind == VG_VECTORS) advice = "pipe it through 'vg-solve' first";
     if (h->kind == VG_DEFORMATIONS)
         advice = "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first";

@@ -12,7 +12,7 @@ static bool *find_attached(const vg_mesh *m, vg_err *e)
     return attached;
 }
 
-static size_t count(const bool *x, size_t n)
+static size_t count_marked(const bool *x, size_t n)
 {
     size_t found = 0;
     for (size_t i = 0; i < n; i++) found += x[i];
@@ -23,7 +23,7 @@ int vgi_count_loose(const vg_mesh *m, size_t *loose, vg_err *e)
 {
     bool *attached = find_attached(m, e);
     if (!attached) return VG_ENOMEM;
-    *loose = m->nv - count(attached, m->nv);
+    *loose = m->nv - count_marked(attached, m->nv);
     free(attached);
     return VG_OK;
 }
@@ -60,7 +60,7 @@ int vgi_slim_make(vgi_slim *s, const vg_head *h, vg_err *e)
 {
     size_t nv = h->body.mesh.nv;
     bool *attached = find_attached(&h->body.mesh, e);
-    size_t kept = attached ? count(attached, nv) : 0;
+    size_t kept = attached ? count_marked(attached, nv) : 0;
     uint32_t *number = NULL;
     int r = attached ? VG_OK : VG_ENOMEM;
     if (r == VG_OK && kept == 0 && nv)

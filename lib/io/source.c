@@ -106,7 +106,7 @@ static int join_head(vg_source *s, const vgi_item *it, const vg_head *h, vg_err 
 static int look_at_stream(vg_source *s, vgi_item *it, vg_err *e)
 {
     if (s->own_name && s->items.n == 1)
-        return vg_fail(e, VG_EARG, "'%s' is a stream, which brings its own mesh: leave out --mesh", vgi_item_name(it));
+        return vg_fail(e, VG_EARG, "'%s' is a stream, which has its own mesh: leave out --mesh", vgi_item_name(it));
     vg_reader *reader = NULL;
     int r = vgi_item_reader(&s->items, it, &reader, e);
     if (r < 0) return r;
@@ -421,7 +421,7 @@ static int open_source(vg_source **out, const char *const *operands, size_t n, c
     if (o) s->reading = o->reading;
     items->objects = s->reading.objects;
     if (o && o->most_bytes) items->limits.member_bytes = items->limits.total_bytes = o->most_bytes;
-    int r = n ? make_belt(s, o ? o->threads : 1, e) : vg_fail(e, VG_EARG, "no input is named");
+    int r = n ? make_belt(s, o ? o->threads : 1, e) : vg_fail(e, VG_EARG, "no input is given");
     if (r == VG_OK && mesh) r = settle_named_mesh(s, mesh, e);
     for (size_t i = 0; r == VG_OK && i < n; i++) r = vgi_items_add(items, operands[i], e);
     if (first_only && items->n) vgi_items_keep(items, 1);
@@ -492,7 +492,7 @@ static bool may_read_ahead(const vg_source *s)
 }
 
 /* Advance by one input or frame: 1 with a frame; VG_OK: call again. There must be something left to read. */
-static int step(vg_source *s, vg_frame *f, vg_err *e)
+static int step_source(vg_source *s, vg_frame *f, vg_err *e)
 {
     if (s->playing.format) return vgi_play_next(&s->playing, &s->own, f, e);
     if (s->archive) return next_member(s, e);
@@ -511,7 +511,7 @@ int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
             return s->failed;
         }
         if (!s->playing.format && !s->reader && !s->archive && s->next == s->items.n) return 0;
-        int r = step(s, f, &s->failure);
+        int r = step_source(s, f, &s->failure);
         if (r > 0) return r;
         s->failed = r; /* reported after the pending poses */
     }

@@ -58,7 +58,7 @@ static int grow_slots(struct reading *in)
 }
 
 /* The vertex at this position, added if it is new. */
-static int weld(struct reading *in, const double x[3], uint32_t *v)
+static int weld_corner(struct reading *in, const double x[3], uint32_t *v)
 {
     vg_mesh *m = &in->m->mesh;
     int r = grow_slots(in);
@@ -86,7 +86,7 @@ static int add_triangle(struct reading *in, double x[9])
         x[k] += 0.0; /* -0 becomes 0 */
     }
     for (int k = 0; k < 3; k++) {
-        int r = weld(in, x + 3 * k, &v[k]);
+        int r = weld_corner(in, x + 3 * k, &v[k]);
         if (r < 0) return r;
     }
     in->triangles++;
@@ -119,7 +119,7 @@ static int read_binary(struct reading *in)
         return vg_fail(in->e, VG_ETRUNC, "%s announces %llu triangles, but ends after %llu", in->subject,
                        (unsigned long long)count, (unsigned long long)there);
     if (n - HEADER > count * FACET)
-        vgi_note(&in->m->note, "left out %llu bytes behind the last triangle",
+        vgi_note(&in->m->note, "left out %llu bytes after the last triangle",
                  (unsigned long long)(n - HEADER - count * FACET));
     int r = VG_OK;
     const char *p = in->data + HEADER;
@@ -166,8 +166,8 @@ static size_t line_of(const struct reading *in, const char *p)
 
 static int unexpected(const struct reading *in, const char *word, size_t n, const char *wanted)
 {
-    if (n == 0) return vg_fail(in->e, VG_ETRUNC, "%s ends where '%s' should come", in->subject, wanted);
-    return vg_fail(in->e, VG_EINPUT, "%s, line %zu: '%.*s' where '%s' should come", in->subject, line_of(in, word),
+    if (n == 0) return vg_fail(in->e, VG_ETRUNC, "%s ends where '%s' is expected", in->subject, wanted);
+    return vg_fail(in->e, VG_EINPUT, "%s, line %zu: '%.*s' where '%s' is expected", in->subject, line_of(in, word),
                    (int)(n < SHOWN ? n : SHOWN), word, wanted);
 }
 
@@ -241,7 +241,7 @@ static int read_text(struct reading *in)
         skip_spaces(in);
     } while (r == VG_OK && in->end - in->p >= 5 && !strncasecmp(in->p, "solid", 5));
     if (r == VG_OK && in->p < in->end)
-        vgi_note(&in->m->note, "left out what stands behind the last solid, from line %zu on", line_of(in, in->p));
+        vgi_note(&in->m->note, "left out data after the last solid, from line %zu on", line_of(in, in->p));
     return r;
 }
 
@@ -292,7 +292,7 @@ static int read_stl(vg_model *m, const char *data, size_t n, const char *subject
     vgi_note_dropped(&m->note, in.dropped);
     if (r == VG_OK && in.triangles == 0) return vg_fail(e, VG_EINPUT, "%s has no triangles", subject);
     if (r == VG_OK && m->mesh.nf == 0)
-        return vg_fail(e, VG_EINPUT, "%s has no triangle whose three corners are apart", subject);
+        return vg_fail(e, VG_EINPUT, "%s has no triangle with three different corners", subject);
     return r;
 }
 
@@ -308,7 +308,7 @@ struct writing {
     vg_err *e;
 };
 
-static const double *point(const struct writing *x, uint32_t v)
+static const double *point_of(const struct writing *x, uint32_t v)
 {
     return x->w->vertices + 3 * (size_t)v;
 }
@@ -331,7 +331,7 @@ static int put_text(struct writing *x, const double normal[3], const uint32_t v[
 {
     int r = put_line(x, "facet normal", normal, false);
     if (r == VG_OK) r = put_line(x, "outer loop\n", NULL, false);
-    for (int k = 0; k < 3 && r == VG_OK; k++) r = put_line(x, "vertex", point(x, v[k]), x->w->full_precision);
+    for (int k = 0; k < 3 && r == VG_OK; k++) r = put_line(x, "vertex", point_of(x, v[k]), x->w->full_precision);
     return r == VG_OK ? put_line(x, "endloop\nendfacet\n", NULL, false) : r;
 }
 
@@ -339,14 +339,14 @@ static int put_triangle(struct writing *x, uint32_t a, uint32_t b, uint32_t c)
 {
     const uint32_t v[3] = {a, b, c};
     double n[3];
-    vgi_triangle_normal(point(x, a), point(x, b), point(x, c), n);
+    vgi_triangle_normal(point_of(x, a), point_of(x, b), point_of(x, c), n);
     if (!isfinite(vgi_make_unit(n))) n[0] = n[1] = n[2] = 0;
     x->triangles++;
     if (x->text) return put_text(x, n, v);
     unsigned char facet[FACET] = {0};
     for (int k = 0; k < 3; k++) vgi_put32(facet + 4 * k, vgi_float_bits((float)n[k]));
     for (int i = 0; i < 9; i++)
-        vgi_put32(facet + 12 + 4 * i, vgi_float_bits((float)point(x, v[i / 3])[i % 3]));
+        vgi_put32(facet + 12 + 4 * i, vgi_float_bits((float)point_of(x, v[i / 3])[i % 3]));
     return vgi_bytes_append(x->out, facet, sizeof facet, x->e);
 }
 
@@ -404,7 +404,7 @@ static int write_stl(vg_bytes *out, const vgi_writing *w, bool text, vg_err *e)
     if (r == VG_OK && text) r = put_line(&x, "endsolid\n", NULL, false);
     free(x.ring);
     if (r < 0) return r;
-    if (x.triangles == 0) return vg_fail(e, VG_EINPUT, "there is no face, and STL holds nothing else");
+    if (x.triangles == 0) return vg_fail(e, VG_EINPUT, "there are no faces, and STL holds nothing else");
     if (x.triangles > UINT32_MAX) return vg_fail(e, VG_EINPUT, "STL holds at most 2^32 - 1 triangles");
     if (!text) vgi_put32(out->data + start + COUNT_OFF, (uint32_t)x.triangles);
     return VG_OK;

@@ -59,8 +59,8 @@ static int read_known(vg_reader *s, const vgi_artefact *t, const vgi_payload *p,
     s->seen[t - vgi_artefacts] = true;
     int r = vgi_artefact_decode(t, p, &s->head, e);
     if (r == VG_EINPUT && vgi_is_earlier_provenance(t, p))
-        return vg_fail(e, VG_EINPUT, "'%s' was written by an earlier version of this program, whose streams are laid "
-                       "out in another way: make it again from its sources", name);
+        return vg_fail(e, VG_EINPUT, "'%s' was written by an earlier version of this program, whose streams have a "
+                                     "different layout: make it again from its sources", name);
     return r;
 }
 

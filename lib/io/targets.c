@@ -23,27 +23,27 @@ int vgi_check_directory(const char *dir, const char *output, vg_err *e)
     struct stat st;
     if (stat(dir, &st) < 0 || access(dir, W_OK | X_OK) < 0)
         return vg_fail(e, VG_ESYS, "cannot write '%s': directory '%s': %s", output, dir, strerror(errno));
-    if (!S_ISDIR(st.st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': '%s' is no directory", output, dir);
+    if (!S_ISDIR(st.st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': '%s' is not a directory", output, dir);
     return VG_OK;
 }
 
 /* 1 with *st if the path can be written or replaced; 0 if nothing exists there; negative for a directory, or a
  * dangling link, which a file would replace. */
-static int look(const char *path, struct stat *st, vg_err *e)
+static int look_at_path(const char *path, struct stat *st, vg_err *e)
 {
     struct stat link;
     bool exists = stat(path, st) == 0;
     if (!exists && errno != ENOENT) return vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
     if (exists && S_ISDIR(st->st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
     if (!exists && lstat(path, &link) == 0)
-        return vg_fail(e, VG_ESYS, "cannot write '%s': it is a link to a file that is not there", path);
+        return vg_fail(e, VG_ESYS, "cannot write '%s': it is a link to a file that does not exist", path);
     return exists;
 }
 
 int vg_target_check(const char *path, vg_err *e)
 {
     struct stat st;
-    int exists = look(path, &st, e);
+    int exists = look_at_path(path, &st, e);
     if (exists < 0) return exists;
     if (exists && !S_ISREG(st.st_mode))
         return access(path, W_OK) == 0 ? VG_OK : vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
@@ -91,7 +91,7 @@ static int make_room(vg_targets *t, vg_err *e)
 int vg_targets_open(vg_targets *t, const char *path, vg_err *e)
 {
     struct stat st;
-    int fd, r = make_room(t, e), exists = r < 0 ? r : look(path, &st, e);
+    int fd, r = make_room(t, e), exists = r < 0 ? r : look_at_path(path, &st, e);
     if (exists < 0) return exists;
     char *real = exists ? realpath(path, NULL) : NULL;
     vg_target *target = &t->at[t->n];
@@ -114,7 +114,7 @@ int vg_targets_open(vg_targets *t, const char *path, vg_err *e)
 int vg_targets_name(vg_targets *t, size_t i, const char *path, vg_err *e)
 {
     struct stat st;
-    int exists = look(path, &st, e);
+    int exists = look_at_path(path, &st, e);
     if (exists < 0) return exists;
     char *real = exists ? realpath(path, NULL) : NULL;
     if (!real && !(real = vgi_copy_string(path, strlen(path), e))) return VG_ENOMEM;

@@ -118,7 +118,7 @@ static int check_time(writing *x, const vg_frame *f, vg_err *e)
         return VG_OK;
     }
     if (!f->has_time)
-        return vg_fail(e, VG_EINPUT, "it has no time, but those before it have (vg-encode --fps gives all times)");
+        return vg_fail(e, VG_EINPUT, "it has no time, but earlier frames have (vg-encode --fps gives all times)");
     if (x->frames && !(f->time > x->last))
         return vg_fail(e, VG_EINPUT, "its time %g is not later than %g, that of the frame before it", f->time,
                        x->last);

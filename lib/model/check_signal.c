@@ -19,8 +19,8 @@ static bool within(const double *x, size_t n)
 static const char *refuse_turns(const vg_signal *s)
 {
     bool homes = s->space == VG_SPACE_VECTORS || s->space == VG_SPACE_GRADIENTS;
-    if (s->examples) return "only shapes of vertices are of examples";
-    if (!s->rooted) return "the place of its shapes is not known";
+    if (s->examples) return "only shapes of vertices can be sums of examples";
+    if (!s->rooted) return "the kind of its shapes is unknown";
     return homes == (s->nturns > 0) ? NULL : "its turns are not those of its shape space";
 }
 
@@ -42,10 +42,10 @@ static const char *refuse_counts(const vg_signal *s, const vg_mesh *mesh)
 static const char *refuse_curve(const vg_signal *s)
 {
     for (size_t i = 0; i + 1 < s->n; i++)
-        if (!(s->parameter[i] < s->parameter[i + 1])) return "its parameters do not rise";
+        if (!(s->parameter[i] < s->parameter[i + 1])) return "its parameters do not ascend";
     for (size_t i = 0; i <= s->k; i++)
         if (!(s->knot[i] <= s->knot[i + 1])) return "its knots fall";
-    if (!(s->knot[2] < s->knot[s->k - 1])) return "its knots span nothing";
+    if (!(s->knot[2] < s->knot[s->k - 1])) return "its knots span an empty interval";
     if (!within(s->knot, s->k + 2) || !within(s->parameter, s->n)) return "a knot is too large";
     return within(s->control, 2 * s->k) ? NULL : "a control point is too far away";
 }
@@ -53,7 +53,7 @@ static const char *refuse_curve(const vg_signal *s)
 static const char *refuse_sites(const vg_signal *s, bool *used)
 {
     for (size_t i = 0; i < s->l; i++) {
-        if (s->site[i] >= s->n) return "a site is no frame";
+        if (s->site[i] >= s->n) return "a site is not a frame";
         if (used[s->site[i]]) return "a frame is a site twice";
         used[s->site[i]] = true;
     }
@@ -71,8 +71,8 @@ int vgi_check_signal(vg_head *h, void *artefact, const char *where, vg_err *e)
         why = refuse_sites(s, used);
         free(used);
     }
-    if (!why && s->nturns && !vgi_are_turns(s->home_turn, s->nturns)) why = "a turn is no unit quaternion";
-    if (!why && s->rooted && !vgi_are_turns(s->turn, s->n)) why = "a turn is no unit quaternion";
+    if (!why && s->nturns && !vgi_are_turns(s->home_turn, s->nturns)) why = "a turn is not a unit quaternion";
+    if (!why && s->rooted && !vgi_are_turns(s->turn, s->n)) why = "a turn is not a unit quaternion";
     for (size_t j = 0; !why && s->bits == 16 && j < s->m; j++)
         if (!(s->basis_unit[j] > 0)) why = "a unit of its basis is not positive";
     return why ? vgi_wrong(where, why, e) : VG_OK;

@@ -44,7 +44,7 @@ int vgi_check_texture(vg_head *h, void *artefact, const char *where, vg_err *e)
     if (a->tex_dim < 1 || a->tex_dim > 3) return vgi_wrong(where, "a texture coordinate must have 1 to 3 numbers", e);
     for (size_t i = 0; i < corners; i++)
         if (a->corner_tex[i] >= a->ntex && a->corner_tex[i] != UINT32_MAX)
-            return vgi_wrong(where, "a corner names a texture coordinate that is not there", e);
+            return vgi_wrong(where, "a corner names a texture coordinate that does not exist", e);
     return VG_OK;
 }
 
@@ -67,7 +67,7 @@ int vgi_check_asset(vg_head *h, void *artefact, const char *where, vg_err *e)
     const vg_asset *a = artefact;
     if (a->n == 0 || a->n >= UINT32_MAX || a->size == 0) return vgi_wrong(where, "its counts are out of range", e);
     for (size_t i = 0; i < a->n; i++)
-        if (a->vertex[i] >= h->body.mesh.nv) return vgi_wrong(where, "it names a vertex that is not there", e);
+        if (a->vertex[i] >= h->body.mesh.nv) return vgi_wrong(where, "it names a vertex that does not exist", e);
     return VG_OK;
 }
 
@@ -135,9 +135,9 @@ int vgi_check_rig(vg_head *h, void *artefact, const char *where, vg_err *e)
     if (!g->skeleton.njoints) return vgi_wrong(where, "it has no joints", e);
     int r = check_joints(&g->skeleton, where, e);
     if (r < 0) return r;
-    if (!vgi_are_turns(g->turn, g->skeleton.njoints)) return vgi_wrong(where, "a turn is no unit quaternion", e);
+    if (!vgi_are_turns(g->turn, g->skeleton.njoints)) return vgi_wrong(where, "a turn is not a unit quaternion", e);
     r = list_bones(g, e);
-    return r == VG_OK && !g->nbones ? vgi_wrong(where, "none of its joints turns", e) : r;
+    return r == VG_OK && !g->nbones ? vgi_wrong(where, "none of its joints rotates", e) : r;
 }
 
 int vgi_check_skin(vg_head *h, void *artefact, const char *where, vg_err *e)
@@ -148,7 +148,7 @@ int vgi_check_skin(vg_head *h, void *artefact, const char *where, vg_err *e)
         const double *w = g->skin_weight + VG_SKIN * v;
         double sum = 0;
         for (size_t i = 0; i < VG_SKIN; i++) {
-            if (bone[i] >= g->nbones) return vgi_wrong(where, "a vertex is moved by a bone that is not there", e);
+            if (bone[i] >= g->nbones) return vgi_wrong(where, "a vertex is moved by a bone that does not exist", e);
             if (!(w[i] >= 0) || (i && w[i] > w[i - 1]))
                 return vgi_wrong(where, "weights are negative, or do not descend", e);
             sum += w[i];
@@ -163,7 +163,7 @@ int vgi_check_skin(vg_head *h, void *artefact, const char *where, vg_err *e)
 static const char *refuse_driven(const vg_correspondence *c, size_t f)
 {
     double sum = 0;
-    if (c->first[f] == c->first[f + 1]) return "a target face is driven by none";
+    if (c->first[f] == c->first[f + 1]) return "a target face has no driver";
     for (uint32_t i = c->first[f]; i < c->first[f + 1]; i++) {
         if (c->source[i] >= c->source_nf) return "a source face is out of range";
         if (!(c->weight[i] > 0)) return "a weight is not positive";
@@ -194,7 +194,7 @@ int vgi_check_patches(vg_head *h, void *artefact, const char *where, vg_err *e)
     const vg_patches *p = artefact;
     if (p->n == 0 || p->n > UINT32_MAX) return vgi_wrong(where, "its count is out of range", e);
     for (size_t f = 0; f < h->body.mesh.nf; f++)
-        if (p->of_face[f] >= p->n) return vgi_wrong(where, "a face is in a patch that is not there", e);
+        if (p->of_face[f] >= p->n) return vgi_wrong(where, "a face is in a patch that does not exist", e);
     return VG_OK;
 }
 
@@ -212,7 +212,7 @@ static const char *refuse_counts(const vg_map *m, const vg_head *h)
     if (m->n == 0 || m->n >= UINT32_MAX || m->nhinges >= UINT32_MAX || m->ncorners >= UINT32_MAX || m->nheld > m->nv)
         return "its counts are out of range";
     if (m->nv != h->body.mesh.nv) return "its count does not fit the mesh";
-    if (m->kind != VG_MAP_PATCHES && m->kind != VG_MAP_BONES) return "it is driven by something unknown";
+    if (m->kind != VG_MAP_PATCHES && m->kind != VG_MAP_BONES) return "its kind of transforms is unknown";
     if (m->nnames && m->nnames != m->n) return "names are missing";
     return m->size > 0 ? NULL : "its size is not positive";
 }
@@ -222,9 +222,9 @@ static const char *refuse_driver(const vg_map *m, const vg_rig *g)
 {
     if (m->kind == VG_MAP_PATCHES) return m->per_corner == 1 ? NULL : "a corner must have one patch";
     if (!g->nbones) return "a RIG record must come before it";
-    if (m->n != g->nbones) return "it has not as many bones as the rig";
+    if (m->n != g->nbones) return "its number of bones is not that of the rig";
     if (m->per_corner < 1 || m->per_corner > 2) return "a corner must have 1 or 2 bones";
-    return m->nhinges ? "pairs of patches stand in a map of bones" : NULL;
+    return m->nhinges ? "a map of bones has hinges" : NULL;
 }
 
 static const char *refuse_parts(const vg_map *m)
@@ -249,9 +249,9 @@ static const char *refuse_driven_parts(const vg_map *m)
     for (size_t i = 0; i < m->ncorners; i++)
         if (is_zero(m->corner + 4 * m->per_corner * i, 4 * m->per_corner)) return "a quaternion is zero";
     for (size_t i = 0; bones && i < m->per_corner * m->ncorners; i++)
-        if (m->corner_bone[i] >= m->n) return "a corner is moved by a bone that is not there";
+        if (m->corner_bone[i] >= m->n) return "a corner is moved by a bone that does not exist";
     for (size_t i = 0; !bones && i < m->nheld; i++)
-        if (m->held_patch[i] >= m->n) return "a vertex is held by a transform that is not there";
+        if (m->held_patch[i] >= m->n) return "a vertex is held by a transform that does not exist";
     return NULL;
 }
 

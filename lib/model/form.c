@@ -21,7 +21,7 @@ static const struct {
     [VG_FEATURES] = {"features", VG_OF_VERTEX, 0},
     [VG_COORDINATES] = {"coordinates", VG_OF_FRAME, 0}};
 
-static vg_kind known(vg_kind k)
+static vg_kind is_known(vg_kind k)
 {
     return (unsigned)k < VG_KINDS ? k : VG_OTHER;
 }
@@ -47,17 +47,17 @@ vg_kind vgi_form_find(const char *name)
 
 size_t vg_kind_width(vg_kind k)
 {
-    return forms[known(k)].width;
+    return forms[is_known(k)].width;
 }
 
 const char *vg_kind_name(vg_kind k)
 {
-    return forms[known(k)].name;
+    return forms[is_known(k)].name;
 }
 
 vg_element vg_kind_element(vg_kind k)
 {
-    return forms[known(k)].element;
+    return forms[is_known(k)].element;
 }
 
 size_t vg_head_width(const vg_head *h)

@@ -72,7 +72,7 @@ static int set_size(vg_channel *c, size_t width, size_t count, vg_err *e)
     return VG_OK;
 }
 
-static vg_channel *find(const vg_frame *f, const char *name, size_t n)
+static vg_channel *find_channel(const vg_frame *f, const char *name, size_t n)
 {
     for (size_t i = 0; i < f->nchannels; i++)
         if (!strncmp(f->channels[i].name, name, n) && !f->channels[i].name[n]) return &f->channels[i];
@@ -81,12 +81,12 @@ static vg_channel *find(const vg_frame *f, const char *name, size_t n)
 
 vg_channel *vg_frame_channel(const vg_frame *f, const char *name)
 {
-    return find(f, name, strlen(name));
+    return find_channel(f, name, strlen(name));
 }
 
 int vgi_frame_add(vg_frame *f, const vgi_channel_texts *t, size_t width, size_t count, vg_channel **out, vg_err *e)
 {
-    vg_channel *c = find(f, t->name, t->name_bytes);
+    vg_channel *c = find_channel(f, t->name, t->name_bytes);
     bool is_new = !c;
     int r = is_new ? more_places(f, e) : VG_OK;
     if (r < 0) return r;

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static void place(const vg_joint_group *group, const double *pose, double at[3])
+static void mean_position(const vg_joint_group *group, const double *pose, double at[3])
 {
     at[0] = at[1] = at[2] = 0;
     for (size_t i = 0; i < group->nvertices; i++)
@@ -21,7 +21,7 @@ int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *
     for (size_t j = 0; j < g->n; j++)
         for (size_t i = 0; i < g->at[j].nvertices; i++)
             if (g->at[j].vertices[i] >= nv)
-                return vg_fail(e, VG_EINPUT, "joint '%.80s' names vertex %u, the mesh has %zu", g->at[j].name,
+                return vg_fail(e, VG_EINPUT, "joint '%.80s' names vertex %u, but the mesh has %zu vertices", g->at[j].name,
                                g->at[j].vertices[i], nv);
     if (!(s->joints = vgi_array(g->n, sizeof *s->joints, e))) return VG_ENOMEM;
     for (; s->njoints < g->n; s->njoints++) {
@@ -37,8 +37,8 @@ int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *
         joint->parent = group->parent;
         joint->nchannels = root ? 6 : 3;
         memcpy(joint->channels, root ? channels : channels + 3, joint->nchannels);
-        place(group, reference, joint->offset);
-        if (!root) place(&g->at[group->parent], reference, above);
+        mean_position(group, reference, joint->offset);
+        if (!root) mean_position(&g->at[group->parent], reference, above);
         vgi_deduct(joint->offset, above);
     }
     return VG_OK;
@@ -67,11 +67,11 @@ static void turn_joint(const vg_joint_groups *g, size_t j, const double *referen
     const vg_joint_group *group = &g->at[j];
     double b[9] = {0}, rest[3], d[3], r[3], below[2][3];
     size_t children = 0;
-    place(group, reference, rest);
+    mean_position(group, reference, rest);
     for (size_t c = j + 1; c < g->n; c++) {
         double at[3];
         if (g->at[c].parent != j) continue;
-        place(&g->at[c], reference, at);
+        mean_position(&g->at[c], reference, at);
         vgi_subtract(at, rest, r);
         vgi_subtract(positions + 3 * c, positions + 3 * j, d);
         add_pair(b, 1, d, r);
@@ -94,6 +94,6 @@ static void turn_joint(const vg_joint_groups *g, size_t j, const double *referen
 void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions,
                           double *turns)
 {
-    for (size_t j = 0; j < g->n; j++) place(&g->at[j], pose, positions + 3 * j);
+    for (size_t j = 0; j < g->n; j++) mean_position(&g->at[j], pose, positions + 3 * j);
     for (size_t j = 0; j < g->n; j++) turn_joint(g, j, reference, pose, positions, turns);
 }

@@ -37,7 +37,7 @@ static int add_reverses(vgi_edges *edges, vg_err *e)
     return r;
 }
 
-static void unite(vgi_laplacian *L, const vgi_edges *edges)
+static void merge_edges(vgi_laplacian *L, const vgi_edges *edges)
 {
     size_t to = 0;
     for (size_t i = 0; i < edges->n; i++) {
@@ -67,7 +67,7 @@ int vgi_laplacian_make(vgi_laplacian *L, size_t nv, vgi_edges *edges, vg_err *e)
     }
     if (r == VG_OK) {
         if (edges->n) qsort(edges->at, edges->n, sizeof *edges->at, compare_edges);
-        unite(L, edges);
+        merge_edges(L, edges);
     }
     vgi_edges_clear(edges);
     if (r < 0) vgi_laplacian_clear(L);

@@ -25,7 +25,7 @@ VGI_INLINE vgi_wide at_most(vgi_wide x, double most)
 }
 
 /* vert: the vertices of one corner of the faces */
-VGI_INLINE void load(const double *points, const uint32_t *vert, vgi_wide to[3])
+VGI_INLINE void load_corner(const double *points, const uint32_t *vert, vgi_wide to[3])
 {
     const double *p[VGI_WIDTH];
 #pragma GCC unroll 8
@@ -61,9 +61,9 @@ static void merge_lanes(vgi_running *r, const wide_running *l)
 VGI_INLINE vgi_wide perimeters(const uint32_t *vert, size_t r, const double *points)
 {
     vgi_wide sum = {0}, a[3], b[3];
-    load(points, vert + (r - 1) * VGI_LANES, a);
+    load_corner(points, vert + (r - 1) * VGI_LANES, a);
     for (size_t i = 0; i < r; i++) {
-        load(points, vert + i * VGI_LANES, b);
+        load_corner(points, vert + i * VGI_LANES, b);
         for (int k = 0; k < 3; k++) a[k] -= b[k];
         sum += vgi_roots(vgi_wide_dot(a, a));
         for (int k = 0; k < 3; k++) a[k] = b[k];
@@ -76,13 +76,13 @@ VGI_INLINE void shape_of(const uint32_t *vert, size_t r, double diagonal, const 
 {
     vgi_wide n[3] = {{0}}, edges = {0}, a[3], b[3], sum[3] = {{0}};
     for (size_t i = 0; i < r; i++) {
-        load(points, vert + i * VGI_LANES, b);
+        load_corner(points, vert + i * VGI_LANES, b);
         for (int k = 0; k < 3; k++) sum[k] += b[k];
     }
-    load(points, vert + (r - 1) * VGI_LANES, a);
+    load_corner(points, vert + (r - 1) * VGI_LANES, a);
     for (int k = 0; k < 3; k++) s->centroid[k] = sum[k] * (1 / (double)r), a[k] -= s->centroid[k];
     for (size_t i = 0; i < r; i++) {
-        load(points, vert + i * VGI_LANES, b);
+        load_corner(points, vert + i * VGI_LANES, b);
         for (int k = 0; k < 3; k++) b[k] -= s->centroid[k];
         n[0] += a[1] * b[2] - a[2] * b[1];
         n[1] += a[2] * b[0] - a[0] * b[2];
@@ -105,7 +105,7 @@ VGI_INLINE vgi_wide planarity_of(const uint32_t *vert, size_t r, const double *p
 {
     vgi_wide sum = {0}, n = {0}, w[3];
     for (size_t i = 0; i < r; i++) {
-        load(points, vert + i * VGI_LANES, w);
+        load_corner(points, vert + i * VGI_LANES, w);
         for (int k = 0; k < 3; k++) w[k] -= s->centroid[k];
         vgi_wide length = vgi_roots(vgi_wide_dot(w, w));
         vgi_mask directed = length > vgi_same(0);

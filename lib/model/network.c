@@ -67,7 +67,7 @@ static const char *refuse_sizes(const vg_network *n)
     if (n->width != 9 && n->width != 12) return "its features are not 9 or 12 numbers";
     if (!n->rank || !n->parts || !n->step) return "a count is 0";
     if (n->numbers != (linear ? n->rank : n->nv * n->width)) return "its frames have a wrong number of numbers";
-    if (n->sets != (n->direction == VG_SEPARATE ? 2 : 1)) return "its sets of parameters do not suit its direction";
+    if (n->sets != (n->direction == VG_SEPARATE ? 2 : 1)) return "its sets of parameters do not match its direction";
     if (linear && n->uncertain) return "a network of coordinates has no variance";
     return n->step > MOST_STEP ? "its step is too large" : refuse_layers(n);
 }

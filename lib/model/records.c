@@ -31,7 +31,7 @@
         return expression;                                                                                           \
     }
 
-static size_t times(size_t a, size_t b)
+static size_t checked_product(size_t a, size_t b)
 {
     size_t product;
     return vgi_mul(a, b, &product) ? product : SIZE_MAX;
@@ -68,7 +68,7 @@ static const vgi_member mesh_fields[] = {
     ARRAY(vg_mesh, U32, start, 1, mesh_starts),
     ARRAY(vg_mesh, U32, vert, 1, mesh_corners)};
 
-LENGTH(texture_numbers, vg_attributes, times(a->ntex, a->tex_dim))
+LENGTH(texture_numbers, vg_attributes, checked_product(a->ntex, a->tex_dim))
 LENGTH(texture_corners, vg_attributes, last_of(mesh->start, mesh->nf))
 static const vgi_member texc_fields[] = {
     NUMBER(vg_attributes, U64, tex_dim),
@@ -154,15 +154,15 @@ static const vgi_member corr_fields[] = {
     ARRAY(vg_correspondence, F64, distance, 1, driven_faces),
     ARRAY(vg_correspondence, U8, matched, 1, driven_faces)};
 
-LENGTH(map_weights, vg_map, times(a->nv, a->n))
-LENGTH(map_place, vg_map, times(a->n, a->n))
+LENGTH(map_weights, vg_map, checked_product(a->nv, a->n))
+LENGTH(map_place, vg_map, checked_product(a->n, a->n))
 LENGTH(map_transforms, vg_map, a->n)
 LENGTH(map_home, vg_map, a->has_home ? a->nv : 0)
 LENGTH(map_hinges, vg_map, a->nhinges)
-LENGTH(map_corners, vg_map, times(a->ncorners, a->per_corner))
+LENGTH(map_corners, vg_map, checked_product(a->ncorners, a->per_corner))
 LENGTH(map_held, vg_map, a->nheld)
 LENGTH(map_placed, vg_map, a->kind == VG_MAP_BONES ? 0 : a->nheld)
-LENGTH(map_corner_bones, vg_map, a->kind == VG_MAP_BONES ? times(a->ncorners, a->per_corner) : 0)
+LENGTH(map_corner_bones, vg_map, a->kind == VG_MAP_BONES ? checked_product(a->ncorners, a->per_corner) : 0)
 LENGTH(map_names, vg_map, a->nnames)
 static const vgi_member map_fields[] = {
     NUMBER(vg_map, U64, n),
@@ -193,11 +193,11 @@ static const vgi_member map_fields[] = {
 
 LENGTH(signal_frames, vg_signal, a->n)
 LENGTH(signal_numbers, vg_signal, a->d)
-LENGTH(signal_basis, vg_signal, a->bits == 64 ? times(a->m, a->d) : 0)
-LENGTH(signal_basis_single, vg_signal, a->bits == 32 ? times(a->m, a->d) : 0)
-LENGTH(signal_basis_short, vg_signal, a->bits == 16 ? times(a->m, a->d) : 0)
+LENGTH(signal_basis, vg_signal, a->bits == 64 ? checked_product(a->m, a->d) : 0)
+LENGTH(signal_basis_single, vg_signal, a->bits == 32 ? checked_product(a->m, a->d) : 0)
+LENGTH(signal_basis_short, vg_signal, a->bits == 16 ? checked_product(a->m, a->d) : 0)
 LENGTH(signal_units, vg_signal, a->bits == 16 ? a->m : 0)
-LENGTH(signal_coordinates, vg_signal, times(a->n, a->m))
+LENGTH(signal_coordinates, vg_signal, checked_product(a->n, a->m))
 LENGTH(signal_sites, vg_signal, a->l)
 LENGTH(signal_knots, vg_signal, one_more(one_more(a->k)))
 LENGTH(signal_controls, vg_signal, a->k)
@@ -242,16 +242,16 @@ static const vgi_member sign_fields[] = {
 
 static size_t of_network(size_t entries, const vg_network *n)
 {
-    return times(entries, times(n->sets, n->nparameters));
+    return checked_product(entries, checked_product(n->sets, n->nparameters));
 }
 
-LENGTH(net_features, vg_network, times(a->nv, a->width))
+LENGTH(net_features, vg_network, checked_product(a->nv, a->width))
 LENGTH(net_rank, vg_network, a->rank)
 LENGTH(net_errors, vg_network, 2 * VG_NETWORK_METHODS * VG_NETWORK_FRAMES)
-LENGTH(net_regression, vg_network, a->model == VG_NETWORK_AUTO ? times(a->rank, one_more(one_more(times(a->rank, 3)))) : 0)
-LENGTH(net_root, vg_network, times(one_more(times(a->rank, 2)), one_more(a->parts)))
+LENGTH(net_regression, vg_network, a->model == VG_NETWORK_AUTO ? checked_product(a->rank, one_more(one_more(checked_product(a->rank, 3)))) : 0)
+LENGTH(net_root, vg_network, checked_product(one_more(checked_product(a->rank, 2)), one_more(a->parts)))
 LENGTH(net_parameters, vg_network, of_network(1, a))
-LENGTH(net_basis, vg_network, times(a->rank, times(a->nv, a->width)))
+LENGTH(net_basis, vg_network, checked_product(a->rank, checked_product(a->nv, a->width)))
 LENGTH(net_curve, vg_network, a->ncurve)
 LENGTH(net_moments, vg_network, a->open ? of_network(1, a) : 0)
 static const vgi_member netw_fields[] = {

@@ -12,7 +12,7 @@ int vg_rig_make(vg_rig *r, const vg_skeleton *s, const double *positions, const 
     *r = (vg_rig){0};
     size_t bones = 0;
     for (size_t j = 0; j < s->njoints; j++) bones += s->joints[j].nchannels > 0;
-    if (!bones) return vg_fail(e, VG_EINPUT, "the skeleton has no joint that turns");
+    if (!bones) return vg_fail(e, VG_EINPUT, "the skeleton has no joint that rotates");
     r->at = vgi_copy_array(positions, 3 * s->njoints, sizeof *r->at, e);
     r->turn = vgi_copy_array(turns, 4 * s->njoints, sizeof *r->turn, e);
     r->bone = vgi_array_raw(bones, sizeof *r->bone, e);

@@ -184,7 +184,7 @@ static void euler_angles(const double q[4], const int axis[3], double *angles)
     memcpy(angles, a[distance[1] < distance[0]], 3 * sizeof *angles);
 }
 
-static void transpose(double m[9])
+static void transpose3(double m[9])
 {
     double t;
     t = m[1], m[1] = m[3], m[3] = t;
@@ -209,8 +209,8 @@ static void climb_to_angles(const double k[9], const int *axis, uint32_t n, doub
             double before[9], behind[9], g[9];
             matrix_of(axis, angles, i, before);
             matrix_of(axis + i + 1, angles + i + 1, n - i - 1, behind);
-            transpose(before);
-            transpose(behind);
+            transpose3(before);
+            transpose3(behind);
             vgi_multiply(before, k, g);
             vgi_multiply(g, behind, g);
             int u = (axis[i] + 1) % 3, v = (axis[i] + 2) % 3;

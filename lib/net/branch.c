@@ -28,7 +28,7 @@ static void near(const double w[3], const double target[3], double out[3])
 /* ---- the first pose ---- */
 
 /* the angle between the rotations of two vectors */
-static double between(const double *a, const double *b)
+static double angle_between(const double *a, const double *b)
 {
     double qa[4], qb[4], la[4] = {0, a[0] / 2, a[1] / 2, a[2] / 2}, lb[4] = {0, b[0] / 2, b[1] / 2, b[2] / 2};
     vg_quat_exp(la, qa);
@@ -38,7 +38,7 @@ static double between(const double *a, const double *b)
 }
 
 /* Prim's tree from the centre: each vertex takes the branch nearest to its parent's. */
-static void grow(const vgi_rings *g, uint32_t centre, double *w, size_t stride, vgi_heap *h, double *key,
+static void grow_tree(const vgi_rings *g, uint32_t centre, double *w, size_t stride, vgi_heap *h, double *key,
                  uint32_t *parent)
 {
     key[centre] = 0, parent[centre] = centre;
@@ -50,7 +50,7 @@ static void grow(const vgi_rings *g, uint32_t centre, double *w, size_t stride, 
         for (uint32_t i = g->first[v]; i < g->first[v + 1]; i++) {
             uint32_t to = g->to[i];
             if (key[to] < 0) continue;
-            double angle = between(w + stride * v, w + stride * to);
+            double angle = angle_between(w + stride * v, w + stride * to);
             if (!(angle < key[to])) continue;
             key[to] = angle, parent[to] = v;
             vgi_heap_lower(h, to);
@@ -66,7 +66,7 @@ int vgi_branch_first(const vgi_rings *g, double *w, size_t stride, vg_err *e)
     if (r == VG_OK) {
         vgi_heap h = {0, heap, heap + g->nv, key};
         for (size_t v = 0; v < g->nv; v++) key[v] = INFINITY, h.place[v] = UINT32_MAX;
-        for (size_t p = 0; p < g->nparts; p++) grow(g, g->centre[p], w, stride, &h, key, parent);
+        for (size_t p = 0; p < g->nparts; p++) grow_tree(g, g->centre[p], w, stride, &h, key, parent);
     }
     free(key);
     free(heap);

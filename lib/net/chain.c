@@ -143,7 +143,7 @@ static void add_spread(net_chains *c, const net_drive *d, size_t t, const net_la
 }
 
 /* input of the first recurrent layer for frame x */
-static void encode(net_chains *c, const net_drive *d, size_t t, const net_lanes *x)
+static void encode_frame(net_chains *c, const net_drive *d, size_t t, const net_lanes *x)
 {
     const vgi_shape *s = c->shape;
     net_lanes *latent = c->latent + t * s->latent, *in = c->input[0] + t * input_rows(s, 0);
@@ -176,7 +176,7 @@ static void recur(net_chains *c, const net_drive *d, size_t t)
 }
 
 /* next += the change given by the last recurrent layer */
-static void decode(net_chains *c, const net_drive *d, size_t t, net_lanes *next)
+static void decode_frame(net_chains *c, const net_drive *d, size_t t, net_lanes *next)
 {
     const vgi_shape *s = c->shape;
     const net_lanes *top = c->top + t * s->hidden;
@@ -221,10 +221,10 @@ static void add_skeleton(const net_drive *d, const net_lanes *x, const net_lanes
 void net_chains_step(net_chains *c, const net_drive *d, size_t t, const net_lanes *x, const net_lanes *before,
                      net_lanes *next)
 {
-    encode(c, d, t, x);
+    encode_frame(c, d, t, x);
     recur(c, d, t);
     memcpy(next, x, c->shape->numbers * sizeof *x);
-    decode(c, d, t, next);
+    decode_frame(c, d, t, next);
     if (d->skeleton) add_skeleton(d, x, before, next);
 }
 
@@ -279,7 +279,7 @@ static void put_waiting(real *to, size_t step, const net_lanes *rows, size_t n)
     for (size_t k = 0; k < n; k++) memcpy(to + (k * PACK + step) * NET_LANES, rows + k, sizeof *rows);
 }
 
-static void settle(const vgi_shape *s, waiting *w, real *gradient)
+static void multiply_packed(const vgi_shape *s, waiting *w, real *gradient)
 {
     size_t k = w->steps * NET_LANES, apart = PACK * NET_LANES;
     if (k) {
@@ -395,7 +395,7 @@ static void encode_back(backward *b, size_t t, const net_lanes *x)
         put_waiting(b->w.spread, b->w.steps, b->dspread, s->latent);
         add_sums(b->dspread, 0, s->latent, 1, b->gradient + s->variance_bias);
     }
-    if (++b->w.steps == PACK) settle(s, &b->w, b->gradient);
+    if (++b->w.steps == PACK) multiply_packed(s, &b->w, b->gradient);
     NET_GEMM(false, false, s->numbers, NET_LANES, s->latent, b->d->parameters + s->full, s->latent,
              FLAT_IN(b->dlatent), NET_LANES, 0, FLAT(dx), NET_LANES);
     if (s->uncertain)
@@ -412,12 +412,12 @@ static void encode_back(backward *b, size_t t, const net_lanes *x)
 }
 
 /* Gradients of the recurrent layers, and of the output of coordinates, over all steps at once. */
-static void finish(backward *b)
+static void finish_gradients(backward *b)
 {
     net_chains *c = b->c;
     const vgi_shape *s = c->shape;
     size_t steps = c->steps - 1, h = s->hidden, k = steps * NET_LANES;
-    if (s->front == VGI_FRONT_MESH) settle(s, &b->w, b->gradient); /* its workspace is where the next one is */
+    if (s->front == VGI_FRONT_MESH) multiply_packed(s, &b->w, b->gradient); /* its workspace is where the next one is */
     for (size_t l = 0; l < s->layers; l++) {
         size_t rows = input_rows(s, l);
         real *in = c->pack, *out = in + rows * k;
@@ -434,7 +434,7 @@ static void finish(backward *b)
     add_sums(c->latent, s->numbers, s->numbers, steps, b->gradient + s->full_bias);
 }
 
-static void prepare(backward *b)
+static void prepare_backward(backward *b)
 {
     net_chains *c = b->c;
     const vgi_shape *s = c->shape;
@@ -470,7 +470,7 @@ void net_chains_backward(net_chains *c, const net_drive *d, void (*pull)(void *c
 {
     const vgi_shape *s = c->shape;
     backward b = {.c = c, .d = d, .gradient = gradient, .divergence = divergence, .shares = shares};
-    prepare(&b);
+    prepare_backward(&b);
     size_t n = s->numbers, last = frames_of(s);
     net_lanes *from_behind = c->frame[last - 5], *later = c->frame[last - 6], *dtop = c->row;
     memset(from_behind, 0, n * sizeof *from_behind);
@@ -484,7 +484,7 @@ void net_chains_backward(net_chains *c, const net_drive *d, void (*pull)(void *c
         if (t && t >= d->given) pass_back(&b, t, t + 2 < c->steps ? later : NULL, from_behind);
         else memset(from_behind, 0, n * sizeof *from_behind);
     }
-    finish(&b);
+    finish_gradients(&b);
     for (size_t l = 0; start && l < s->layers; l++)
         memcpy(start + 2 * l * s->hidden, b.dh[l], 2 * s->hidden * sizeof *start);
 }

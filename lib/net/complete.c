@@ -71,7 +71,7 @@ static int make_way(way *w, vg_generator *g, size_t n, size_t lanes, vg_err *e)
 
 /* ---- frames ---- */
 
-static double distance(const double *a, const double *b, size_t n)
+static double frame_distance(const double *a, const double *b, size_t n)
 {
     double sum = 0;
     for (size_t i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
@@ -79,7 +79,7 @@ static double distance(const double *a, const double *b, size_t n)
 }
 
 /* a distance of frames relative to the range of the training data */
-static double share(const way *w, double far)
+static double share_of_range(const way *w, double far)
 {
     double span = vgi_network_span(w->g->net);
     return span > 0 ? far / span : 0;
@@ -102,7 +102,7 @@ static int run_back(way *w, size_t lanes, vg_err *e)
 
 /* Copy the first `count` frames of the run `along` into the path, with `miss` spread over the first `length` of them.
  * back: the run starts at the second key. */
-static void spread(way *w, const double *along, const double *miss, size_t length, size_t count, bool back)
+static void spread_miss(way *w, const double *along, const double *miss, size_t length, size_t count, bool back)
 {
     size_t numbers = w->g->net->numbers;
     for (size_t t = 0; t < count; t++) {
@@ -111,7 +111,7 @@ static void spread(way *w, const double *along, const double *miss, size_t lengt
     }
 }
 
-static void difference(const double *a, const double *b, size_t n, double *to)
+static void subtract_frames(const double *a, const double *b, size_t n, double *to)
 {
     for (size_t k = 0; k < n; k++) to[k] = a[k] - b[k];
 }
@@ -131,43 +131,43 @@ static int find_spread(way *w, vg_err *e)
     }
     if (r == VG_OK) r = run_forward(w, 1, e);
     if (r < 0) return r;
-    far[0] = distance(w->to.frame, w->forward[0] + n * numbers, numbers);
+    far[0] = frame_distance(w->to.frame, w->forward[0] + n * numbers, numbers);
     if (g->net->direction != VG_FORWARD) {
         vgi_generator_states(g, true, 0);
         r = run_back(w, 1, e);
-        far[1] = distance(w->from.frame, w->back[0] + n * numbers, numbers);
+        far[1] = frame_distance(w->from.frame, w->back[0] + n * numbers, numbers);
     }
     w->found.backward = far[1] < far[0];
     const double *along = w->found.backward ? w->back[0] : w->forward[0];
-    difference(w->found.backward ? w->from.frame : w->to.frame, along + n * numbers, numbers, miss);
-    w->found.miss = share(w, fmin(far[0], far[1]));
-    spread(w, along, miss, n + 1, n, w->found.backward);
+    subtract_frames(w->found.backward ? w->from.frame : w->to.frame, along + n * numbers, numbers, miss);
+    w->found.miss = share_of_range(w, fmin(far[0], far[1]));
+    spread_miss(w, along, miss, n + 1, n, w->found.backward);
     return r;
 }
 
 /* Find where the two runs of a lane are nearest at the same time: frame at + 1 of n; returns the distance. */
-static double nearest(const way *w, size_t lane, size_t *at)
+static double nearest_frames(const way *w, size_t lane, size_t *at)
 {
     size_t numbers = w->g->net->numbers;
     double least = INFINITY;
     for (size_t t = 0; t < w->n; t++) {
-        double far = distance(w->forward[lane] + t * numbers, w->back[lane] + (w->n - 1 - t) * numbers, numbers);
+        double far = frame_distance(w->forward[lane] + t * numbers, w->back[lane] + (w->n - 1 - t) * numbers, numbers);
         if (far < least) least = far, *at = t;
     }
     return least;
 }
 
 /* Bend both runs to the midpoint between them at frame `at`. */
-static void join(way *w, size_t lane, size_t at)
+static void join_runs(way *w, size_t lane, size_t at)
 {
     size_t numbers = w->g->net->numbers;
     double *half = w->g->numbers;
     const double *there = w->forward[lane] + at * numbers, *back = w->back[lane] + (w->n - 1 - at) * numbers;
-    difference(back, there, numbers, half);
+    subtract_frames(back, there, numbers, half);
     for (size_t k = 0; k < numbers; k++) half[k] /= 2;
-    spread(w, w->forward[lane], half, at + 1, at + 1, false);
+    spread_miss(w, w->forward[lane], half, at + 1, at + 1, false);
     for (size_t k = 0; k < numbers; k++) half[k] = -half[k];
-    spread(w, w->back[lane], half, w->n - at, w->n - 1 - at, true);
+    spread_miss(w, w->back[lane], half, w->n - at, w->n - 1 - at, true);
 }
 
 /* As printed: random initial states until the runs come close enough; otherwise join the nearest ones. */
@@ -183,12 +183,12 @@ static int find_merge(way *w, vg_err *e)
         vgi_generator_states(g, true, 2 * batch + 1);
         if (r == VG_OK) r = run_back(w, NET_LANES, e);
         for (size_t i = 0; r == VG_OK && i < NET_LANES && !w->found.merged; i++) {
-            double far = share(w, nearest(w, i, &at));
+            double far = share_of_range(w, nearest_frames(w, i, &at));
             w->found.tries++;
             if (!(far < best)) continue;
             best = far;
             w->found.merged = far <= g->o.merge;
-            join(w, i, at);
+            join_runs(w, i, at);
         }
     }
     w->found.miss = best;
@@ -226,7 +226,7 @@ static void move_root(way *w)
 }
 
 /* Spread the error of the root at the second key over the run; in a cycle its shift is not changed. */
-static void bend_root(way *w, bool loop)
+static void spread_root_error(way *w, bool loop)
 {
     size_t parts = w->g->net->parts, main_part = w->g->main_part, wide = 3 * parts;
     const double *reached = w->centroids + wide * w->n;
@@ -301,9 +301,9 @@ int vg_generator_between(vg_generator *g, const double *key, bool loop, size_t n
                          vg_err *e)
 {
     way w;
-    if (!g->given) return vg_fail(e, VG_EINPUT, "no pose is given to begin from");
+    if (!g->given) return vg_fail(e, VG_EINPUT, "no pose is given to start from");
     if (g->o.merge > 0 && g->net->direction == VG_FORWARD)
-        return vg_fail(e, VG_EINPUT, "the network runs forward only: its ways from two keys cannot meet");
+        return vg_fail(e, VG_EINPUT, "the network runs forward only: there is no run back from the second key");
     size_t frames = g->net->step > 1 ? (n + 1 + g->net->step / 2) / g->net->step : n + 1; /* in network frames; the
                                                                                              key is the last */
     if (frames < 2) frames = 2;
@@ -318,7 +318,7 @@ int vg_generator_between(vg_generator *g, const double *key, bool loop, size_t n
     if (r == VG_OK) r = g->o.merge > 0 ? find_merge(&w, e) : find_spread(&w, e);
     if (r == VG_OK) {
         move_root(&w);
-        bend_root(&w, loop);
+        spread_root_error(&w, loop);
         r = make_poses(&w, n, poses, e);
         arrive(&w);
     }

@@ -251,7 +251,7 @@ static int encode_all(vgi_dataset *s, const vg_network *n, int threads, vg_err *
 }
 
 /* standard deviation and range of coordinate k, or of its change */
-static double spread(const vgi_dataset *s, size_t k, bool change, double range[2])
+static double coordinate_range(const vgi_dataset *s, size_t k, bool change, double range[2])
 {
     double sum = 0, squares = 0;
     size_t n = 0;
@@ -269,14 +269,14 @@ static double spread(const vgi_dataset *s, size_t k, bool change, double range[2
 static int find_scales(vgi_dataset *s, vg_network *n, vg_err *e)
 {
     size_t k = s->rank;
-    double ignored[2], first_change = spread(s, 0, true, ignored);
+    double ignored[2], first_change = coordinate_range(s, 0, true, ignored);
     n->scale = vgi_array(2 * k, sizeof *n->scale, e), n->range = vgi_array(2 * k, sizeof *n->range, e);
     if (!n->scale || !n->range) return VG_ENOMEM;
-    s->sigma = spread(s, 0, false, ignored);
+    s->sigma = coordinate_range(s, 0, false, ignored);
     for (size_t i = 0; i < k; i++) {
-        double range[2], own = spread(s, i, false, range);
+        double range[2], own = coordinate_range(s, i, false, range);
         n->scale[i] = fmax(own, least_scale * s->sigma);
-        n->scale[k + i] = change_scale * fmax(spread(s, i, true, ignored), least_change * first_change);
+        n->scale[k + i] = change_scale * fmax(coordinate_range(s, i, true, ignored), least_change * first_change);
         n->range[i] = range[0], n->range[k + i] = range[1];
     }
     return VG_OK;
@@ -286,7 +286,7 @@ int vgi_dataset_find_coordinates(vgi_dataset *s, vg_network *n, size_t most, int
 {
     size_t frames = vgi_spans_frames(&s->train);
     if (frames < LEAST_FRAMES)
-        return vg_fail(e, VG_EINPUT, "%zu frames are left to learn from: at least %d are needed", frames, LEAST_FRAMES);
+        return vg_fail(e, VG_EINPUT, "%zu frames are left for training: at least %d are needed", frames, LEAST_FRAMES);
     find_range(s, n);
     int r = find_basis(s, n, most, threads, e);
     if (r == VG_OK) r = encode_all(s, n, threads, e);

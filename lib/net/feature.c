@@ -147,7 +147,7 @@ static void measure_block(void *context, size_t task)
 }
 
 /* choose the whole turns of one pose, and the sign of its root */
-static int follow(vg_featurer *f, double *w, double *root, vg_err *e)
+static int follow_branches(vg_featurer *f, double *w, double *root, vg_err *e)
 {
     double same = 0;
     if (!f->begun && vgi_branch_first(&f->rings, w, f->width, e) < 0) return VG_ENOMEM;
@@ -167,7 +167,7 @@ int vg_featurer_measure(vg_featurer *f, size_t n, const double *const *poses, do
     job j = {.f = f, .n = n, .in = poses, .out = values, .roots_out = roots, .centroids_out = centroids};
     in_rounds(f, &j, measure_block);
     for (size_t i = 0; i < n; i++)
-        if (follow(f, values[i], roots[i], e) < 0) return VG_ENOMEM;
+        if (follow_branches(f, values[i], roots[i], e) < 0) return VG_ENOMEM;
     return VG_OK;
 }
 

@@ -19,7 +19,7 @@ VGI_INLINE const vgi_wide_at *wide_of(const vgi_lanes *p, int h)
 }
 
 /* to += by * x, eight lanes */
-VGI_INLINE void add(vgi_lanes *to, double by, const vgi_lanes *x)
+VGI_INLINE void add_scaled(vgi_lanes *to, double by, const vgi_lanes *x)
 {
     for (int h = 0; h < VGI_PARTS; h++) *wide(to, h) += by * *wide_of(x, h);
 }
@@ -92,7 +92,7 @@ VGI_INLINE void symmetrise(const vgi_wide *x, vgi_wide *d)
 /* remaining rotations are rounding errors */
 static const vgi_polar_stop stop = {.scaled = 3, .enough = 1e-15, .alone = true};
 
-static void measure(const vgi_rings *r, vgi_feature_block *b, const double *const *poses)
+static void measure_poses(const vgi_rings *r, vgi_feature_block *b, const double *const *poses)
 {
     load_points(r, b, poses);
     add_normals(r, b);
@@ -139,13 +139,13 @@ VGI_INLINE void load_sides(const vgi_rings *r, vgi_feature_block *b)
 }
 
 /* per part the mean of a row over its vertices */
-static void means(const vgi_rings *r, const vgi_row *row, vgi_row *sum)
+static void part_means(const vgi_rings *r, const vgi_row *row, vgi_row *sum)
 {
     memset(sum, 0, r->nparts * sizeof *sum);
     for (size_t v = 0; v < r->nv; v++)
-        for (int k = 0; k < 3 && r->part[v] >= 0; k++) add(&sum[r->part[v]].xyz[k], 1, &row[v].xyz[k]);
+        for (int k = 0; k < 3 && r->part[v] >= 0; k++) add_scaled(&sum[r->part[v]].xyz[k], 1, &row[v].xyz[k]);
     for (size_t p = 0; p < r->nparts; p++)
-        for (int k = 0; k < 3; k++) add(&sum[p].xyz[k], 1 / (double)r->part_size[p] - 1, &sum[p].xyz[k]);
+        for (int k = 0; k < 3; k++) add_scaled(&sum[p].xyz[k], 1 / (double)r->part_size[p] - 1, &sum[p].xyz[k]);
 }
 
 /* b->normal: the points that fit the gradients, with the centre of each part moved to 0 */
@@ -239,16 +239,16 @@ static void rest_centre(const vgi_rings *r, double centre[3])
 /* output the centroids; move points and reconstruction so that each part's centre is at 0 */
 static void put_centroids(const vgi_rings *r, vgi_feature_block *b, bool both, double *const *centroids)
 {
-    means(r, b->point, b->sum);
+    part_means(r, b->point, b->sum);
     for (size_t p = 0; p < r->nparts; p++)
         for (size_t lane = 0; lane < VGI_LANES; lane++)
             for (size_t k = 0; k < 3; k++) centroids[lane][3 * p + k] = b->sum[p].xyz[k][lane];
     if (!both) return;
     for (int pass = 0; pass < 2; pass++) {
         vgi_row *row = pass ? b->normal : b->point;
-        if (pass) means(r, row, b->sum);
+        if (pass) part_means(r, row, b->sum);
         for (size_t v = 0; v < r->nv; v++)
-            for (int k = 0; k < 3 && r->part[v] >= 0; k++) add(&row[v].xyz[k], -1, &b->sum[r->part[v]].xyz[k]);
+            for (int k = 0; k < 3 && r->part[v] >= 0; k++) add_scaled(&row[v].xyz[k], -1, &b->sum[r->part[v]].xyz[k]);
     }
 }
 
@@ -279,7 +279,7 @@ static void close_open_rings(const vgi_rings *r, vgi_feature_block *b)
         }
 }
 
-static void put(const vgi_rings *r, vgi_feature_block *b, size_t width, const double *const *poses,
+static void put_features(const vgi_rings *r, vgi_feature_block *b, size_t width, const double *const *poses,
                 double *const *values, double *const *centroids)
 {
     double rest[3];
@@ -343,7 +343,7 @@ VGI_INLINE void take_vertex(vgi_feature_block *b, size_t v, size_t width, const 
         }
 }
 
-static void place(const vgi_rings *r, const vgi_feature_block *b, const double rest[3], size_t lane,
+static void place_vertex(const vgi_rings *r, const vgi_feature_block *b, const double rest[3], size_t lane,
                   const double *centroids, double *vertices)
 {
     const double *root = centroids + 3 * r->main_part;
@@ -367,10 +367,10 @@ static void back(const vgi_rings *r, vgi_feature_block *b, size_t width, const d
     load_sides(r, b);
     reconstruct(r, b);
     for (size_t v = 0; v < r->nv; v++)
-        for (int k = 0; k < 3; k++) add(&b->normal[v].xyz[k], 1, &b->point[v].xyz[k]);
-    means(r, b->normal, b->sum);
+        for (int k = 0; k < 3; k++) add_scaled(&b->normal[v].xyz[k], 1, &b->point[v].xyz[k]);
+    part_means(r, b->normal, b->sum);
     rest_centre(r, rest);
-    for (size_t lane = 0; lane < lanes; lane++) place(r, b, rest, lane, centroids[lane], vertices[lane]);
+    for (size_t lane = 0; lane < lanes; lane++) place_vertex(r, b, rest, lane, centroids[lane], vertices[lane]);
 }
 
-const vgi_feature_kernel VGI_OF_SET(vgi_feature_kernel) = {measure, put, back};
+const vgi_feature_kernel VGI_OF_SET(vgi_feature_kernel) = {measure_poses, put_features, back};

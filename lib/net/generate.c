@@ -42,7 +42,7 @@ int vg_generator_new(vg_generator **out, const vg_network *n, const vg_mesh *m, 
         const vgi_rings *rings = vgi_featurer_rings(g->featurer);
         g->main_part = stats.main_part;
         r = stats.parts == n->parts ? vgi_runner_make(&g->runner, n, rings->first, rings->to, 2, e)
-                                       : vg_fail(e, VG_EINPUT, "the network has another number of components");
+                                       : vg_fail(e, VG_EINPUT, "the network has a different number of components");
     }
     if (r == VG_OK) r = make_rooms(g, e);
     if (r < 0) vg_generator_free(out);
@@ -131,7 +131,7 @@ static void put_frame(const double *from, size_t n, net_lanes *to)
 }
 
 /* Restart the chains from the remembered frames. */
-static void begin(vg_generator *g)
+static void restart_chains(vg_generator *g)
 {
     size_t n = g->net->numbers;
     vgi_generator_thin(g);
@@ -165,11 +165,11 @@ static double keep_in_range(const vg_generator *g, double *c, bool clip)
 }
 
 /* The next frame: g->x, normalised, and its coordinates g->c. */
-static void advance(vg_generator *g)
+static void next_frame(vg_generator *g)
 {
     bool linear = vgi_network_is_linear(g->net), corrects = g->net->model == VG_NETWORK_AUTO;
     bool longer = g->made >= VGI_SHORT_RUN, again = corrects && longer && (g->made - VGI_SHORT_RUN) % VGI_LONG_STEP == 0;
-    if (!g->begun || again) begin(g);
+    if (!g->begun || again) restart_chains(g);
     const net_lanes *next = vgi_runner_give(&g->runner);
     for (size_t i = 0; i < g->net->numbers; i++) g->numbers[i] = (double)next[i][0];
     memcpy(g->c_before, g->c, g->net->rank * sizeof *g->c);
@@ -200,7 +200,7 @@ int vgi_generator_pose(vg_generator *g, const double *x, const double *root, con
     vgi_network_features(g->net, x, g->features);
     vg_featurer_solve(g->featurer, 1, &values, &root, &centroids, &pose);
     for (size_t i = 0; i < 3 * g->nv; i++)
-        if (!isfinite(pose[i])) return vg_fail(e, VG_EINPUT, "the network runs away: its numbers are not finite");
+        if (!isfinite(pose[i])) return vg_fail(e, VG_EINPUT, "the network diverges: its numbers are not finite");
     return VG_OK;
 }
 
@@ -230,12 +230,12 @@ static int pose_between(vg_generator *g, double part, double *pose, vg_err *e)
 
 int vg_generator_next(vg_generator *g, double *pose, vg_err *e)
 {
-    if (!g->given) return vg_fail(e, VG_EINPUT, "no pose is given to go on from");
+    if (!g->given) return vg_fail(e, VG_EINPUT, "no pose is given to continue from");
     if (!g->part) {
         memcpy(g->x_from, g->x, g->d * sizeof *g->x);
         memcpy(g->root_from, g->root, sizeof g->root);
         memcpy(g->centroids_from, g->centroids, 3 * g->net->parts * sizeof *g->centroids);
-        advance(g);
+        next_frame(g);
         vgi_generator_move(g, g->c, g->c_before, g->root, g->centroids);
     }
     double part = (double)++g->part / (double)g->net->step;

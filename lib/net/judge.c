@@ -11,7 +11,7 @@ static const size_t looked_at[VG_NETWORK_FRAMES] = {5, 10, 15};
 
 /* ---- the validation block ---- */
 
-static double distance(const float *a, const double *b, size_t n)
+static double frame_distance(const float *a, const double *b, size_t n)
 {
     double sum = 0;
     for (size_t k = 0; k < n; k++) sum += ((double)a[k] - b[k]) * ((double)a[k] - b[k]);
@@ -69,7 +69,7 @@ int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e)
             r = vgi_runner_go(&t->runner, false, lanes, GIVEN, (const double *const *)x.in, LONGEST, x.out, e);
             for (size_t l = 0; r == VG_OK && l < lanes; l++, total++)
                 for (size_t g = 0; g < lengths[l]; g++)
-                    sum += distance(t->frames + (starts[l] + g) * n, x.out[l] + g * n, n) / (double)lengths[l];
+                    sum += frame_distance(t->frames + (starts[l] + g) * n, x.out[l] + g * n, n) / (double)lengths[l];
             lanes = 0;
             if (i == t->tried.n || r < 0) break;
         }
@@ -114,7 +114,7 @@ static void choose_windows(judging *j)
 }
 
 /* Mean distances of the pending poses from the truth, in % of D. */
-static void settle(judging *j)
+static void settle_poses(judging *j)
 {
     vg_trainer *t = j->t;
     size_t nv = t->mesh.nv, d = t->data.d;
@@ -139,9 +139,9 @@ static void settle(judging *j)
 }
 
 /* x (d normalised numbers) predicts frame `truth` */
-static double *put(judging *j, size_t truth, double *to)
+static double *put_pose(judging *j, size_t truth, double *to)
 {
-    if (j->waiting == NET_LANES) settle(j);
+    if (j->waiting == NET_LANES) settle_poses(j);
     j->truth[j->waiting] = truth, j->to[j->waiting] = to;
     return j->x + j->waiting++ * j->t->data.d;
 }
@@ -159,7 +159,7 @@ static void simple_methods(judging *j, size_t w, int given, vg_network_errors *e
         if (s + ahead > j->end[w]) continue;
         for (int m = 0; m < (given ? 3 : 1); m++) {
             double far = m == 0 ? 0 : m == 1 ? (double)ahead : 0.9 * (1 - pow(0.9, (double)ahead)) / 0.1;
-            double *x = put(j, s + ahead - 1, &errors->at[given][m][i]);
+            double *x = put_pose(j, s + ahead - 1, &errors->at[given][m][i]);
             for (size_t k = 0; k < d; k++) x[k] = last[k] + far * step[k];
         }
     }
@@ -168,7 +168,7 @@ static void simple_methods(judging *j, size_t w, int given, vg_network_errors *e
 /* Convert predicted coordinates to a pose; the part of the last given frame outside the basis is kept. */
 static void put_coordinates(judging *j, const double *c, const double *kept, size_t truth, double *to)
 {
-    double *x = put(j, truth, to);
+    double *x = put_pose(j, truth, to);
     vgi_network_decode(&j->t->net, c, x);
     for (size_t k = 0; k < j->t->data.d; k++) x[k] += kept[k];
 }
@@ -213,7 +213,7 @@ static int network_alone(judging *j, size_t first, size_t lanes, int given, runs
             if (s + looked_at[i] > j->end[first + l]) continue;
             const double *c = x->out[l] + (looked_at[i] - 1) * n;
             if (vgi_network_is_linear(&t->net)) put_coordinates(j, c, room, s + looked_at[i] - 1, &errors->at[given][4][i]);
-            else memcpy(put(j, s + looked_at[i] - 1, &errors->at[given][4][i]), c, n * sizeof *c);
+            else memcpy(put_pose(j, s + looked_at[i] - 1, &errors->at[given][4][i]), c, n * sizeof *c);
         }
     }
     return VG_OK;
@@ -231,7 +231,7 @@ static int judge_all(judging *j, vg_network_errors *errors, double *room, vg_err
         r = runs_make(&x, given ? 3 : 1, AHEAD, j->t->net.numbers, e);
         for (size_t w = 0; r == VG_OK && w < j->windows; w += NET_LANES)
             r = network_alone(j, w, j->windows - w < NET_LANES ? j->windows - w : NET_LANES, given, &x, errors, room, e);
-        settle(j);
+        settle_poses(j);
         runs_clear(&x);
     }
     return r;
@@ -249,7 +249,7 @@ static void take_means(const judging *j, vg_network_errors *errors)
             }
 }
 
-static void keep(vg_trainer *t, const vg_network_errors *errors)
+static void store_errors(vg_trainer *t, const vg_network_errors *errors)
 {
     const double *x = &errors->at[0][0][0];
     for (size_t i = 0; i < sizeof errors->at / sizeof *x; i++) t->net.errors[i] = isnan(x[i]) ? -1 : x[i];
@@ -273,7 +273,7 @@ int vg_trainer_judge(vg_trainer *t, vg_network_errors *errors, vg_err *e)
         r = judge_all(&j, errors, room, e);
         vgi_blas_shared();
         take_means(&j, errors);
-        keep(t, errors);
+        store_errors(t, errors);
     }
     free(j.x);
     free(room);

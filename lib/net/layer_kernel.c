@@ -86,7 +86,7 @@ static void all_gates_back(size_t n, const net_lanes *g, const net_lanes *before
 
 enum { MOST_CHANNELS = 16 };
 
-INLINE void means(const net_neighbours *g, size_t c, const net_lanes *x, net_lanes *m)
+INLINE void neighbour_means(const net_neighbours *g, size_t c, const net_lanes *x, net_lanes *m)
 {
     for (size_t v = 0; v < g->n; v++) {
         net_lanes sum[MOST_CHANNELS];
@@ -102,7 +102,7 @@ INLINE void means(const net_neighbours *g, size_t c, const net_lanes *x, net_lan
 }
 
 /* y (+)= x times a matrix of c x c, per vertex; by_rows: rows of the matrix belong to the inputs */
-INLINE void times(size_t n, size_t c, const net_lanes *x, const real *matrix, bool by_rows, const real *bias, bool add,
+INLINE void multiply_vertices(size_t n, size_t c, const net_lanes *x, const real *matrix, bool by_rows, const real *bias, bool add,
                   net_lanes *y)
 {
     real w[MOST_CHANNELS * MOST_CHANNELS];
@@ -122,9 +122,9 @@ INLINE void times(size_t n, size_t c, const net_lanes *x, const real *matrix, bo
 INLINE void convolve_by(const net_neighbours *g, const net_convolution *p, size_t c, const net_lanes *x, net_lanes *y,
                         net_lanes *work)
 {
-    means(g, c, x, work);
-    times(g->n, c, x, p->own, !p->mirrored, p->bias, false, y);
-    times(g->n, c, work, p->mean, !p->mirrored, NULL, true, y);
+    neighbour_means(g, c, x, work);
+    multiply_vertices(g->n, c, x, p->own, !p->mirrored, p->bias, false, y);
+    multiply_vertices(g->n, c, work, p->mean, !p->mirrored, NULL, true, y);
     all_tanh(y, c * g->n);
 }
 
@@ -174,11 +174,11 @@ INLINE void convolve_back_by(const net_neighbours *g, const net_convolution *p, 
         }
     for (size_t k = 0; k < c; k++)
         for (int i = 0; i < NET_LANES; i++) dbias[k] += sum[k][i];
-    means(g, c, x, m);
+    neighbour_means(g, c, x, m);
     add_products(g->n, c, x, dy, p->mirrored, down);
     add_products(g->n, c, m, dy, p->mirrored, dmean);
-    times(g->n, c, dy, p->own, p->mirrored, NULL, false, dx);
-    times(g->n, c, dy, p->mean, p->mirrored, NULL, false, e);
+    multiply_vertices(g->n, c, dy, p->own, p->mirrored, NULL, false, dx);
+    multiply_vertices(g->n, c, dy, p->mean, p->mirrored, NULL, false, e);
     for (size_t v = 0; v < g->n; v++) {
         uint32_t n = g->first[v + 1] - g->first[v];
         for (size_t k = 0; k < c; k++) e[c * v + k] *= n ? (real)1 / (real)n : 0;

@@ -75,13 +75,13 @@ static double *norms(const net_group *g, int which, size_t t)
 }
 
 /* Whether frame t is compared with the truth. Frames inserted before the first one are not. */
-static bool counts(const net_group *g, size_t t)
+static bool is_counted(const net_group *g, size_t t)
 {
     return t > (g->before ? 2 : 0);
 }
 
 /* Store distances in g->norm, add their sums to *loss. */
-static void measure(side *s, net_loss *loss)
+static void measure_losses(side *s, net_loss *loss)
 {
     net_group *g = s->g;
     const net_chains *c = &g->chains[s->which];
@@ -95,14 +95,14 @@ static void measure(side *s, net_loss *loss)
             if (s->which == 0) between[i] = sqrt(apart[i] + 1e-12);
             if (!in_use(g, i)) continue;
             bool forward = s->which == 0 && i < half;
-            if (counts(g, t)) loss->total += to_truth[i] / (double)g->batch;
-            if (counts(g, t) && forward) loss->frames += to_truth[i] / (double)g->batch / (double)(g->steps - 1);
+            if (is_counted(g, t)) loss->total += to_truth[i] / (double)g->batch;
+            if (is_counted(g, t) && forward) loss->frames += to_truth[i] / (double)g->batch / (double)(g->steps - 1);
             if (forward && other(s, t)) loss->total += g->bidirectional * between[i] / (double)g->batch;
         }
     }
 }
 
-static void pull(void *context, size_t t, net_lanes *gradient)
+static void add_loss_gradient(void *context, size_t t, net_lanes *gradient)
 {
     side *s = context;
     net_group *g = s->g;
@@ -113,14 +113,14 @@ static void pull(void *context, size_t t, net_lanes *gradient)
         /* for the second of separate chains, time is reversed */
         const double *between = norms(g, 2, s->which ? g->steps - 1 - t : t);
         if (!in_use(g, i)) continue;
-        by[0][i] = counts(g, t) ? (real)(1 / (norms(g, s->which, t)[i] * (double)g->batch)) : 0;
+        by[0][i] = is_counted(g, t) ? (real)(1 / (norms(g, s->which, t)[i] * (double)g->batch)) : 0;
         by[1][i] = (real)(g->bidirectional / (between[i] * (double)g->batch));
     }
     truth(s, t, s->truth);
     net_pull(n, c->state + t * n, s->truth, other(s, t), g->direction == VG_SHARED ? 4 : 0, by, gradient);
 }
 
-static void begin(net_group *g, int which, double start, uint64_t seed)
+static void begin_chains(net_group *g, int which, double start, uint64_t seed)
 {
     net_chains *c = &g->chains[which];
     const vgi_shape *s = c->shape;
@@ -161,16 +161,16 @@ net_loss net_group_run(net_group *g, const net_drive drives[2], real *const grad
         d[w] = drives[w];
         d[w].truth = truth, d[w].context = &s[w];
         d[w].forward = w ? 0 : g->direction == VG_SHARED ? NET_LANES / 2 : NET_LANES;
-        begin(g, w, start, seed);
+        begin_chains(g, w, start, seed);
         net_chains_forward(&g->chains[w], &d[w]);
     }
-    for (int w = 0; w < sides; w++) measure(&s[w], &loss);
+    for (int w = 0; w < sides; w++) measure_losses(&s[w], &loss);
     for (int w = 0; w < sides; w++) {
         net_lanes shares;
         loss.total += g->divergence * divergence(g, w, &shares);
         /* a frame that the backward pass does not use at this point */
         s[w].truth = g->chains[w].frame[g->chains[w].shape->front == VGI_FRONT_MESH ? 0 : 4];
-        net_chains_backward(&g->chains[w], &d[w], pull, &s[w], g->divergence, &shares, gradient[w], NULL);
+        net_chains_backward(&g->chains[w], &d[w], add_loss_gradient, &s[w], g->divergence, &shares, gradient[w], NULL);
     }
     return loss;
 }

@@ -9,7 +9,7 @@
 
 static int count, own;
 
-static void start(void)
+static void start_mpi(void)
 {
     if (count) return;
     MPI_Init(NULL, NULL);
@@ -19,18 +19,18 @@ static void start(void)
 
 size_t vgi_ranks(void)
 {
-    start();
+    start_mpi();
     return (size_t)count;
 }
 
 size_t vgi_rank(void)
 {
-    start();
+    start_mpi();
     return (size_t)own;
 }
 
 /* MPI counts in int */
-static void share(size_t from, void *x, size_t n, size_t size, MPI_Datatype type)
+static void broadcast(size_t from, void *x, size_t n, size_t size, MPI_Datatype type)
 {
     for (size_t at = 0; at < n; at += INT_MAX / 8) {
         size_t part = n - at < INT_MAX / 8 ? n - at : INT_MAX / 8;
@@ -40,12 +40,12 @@ static void share(size_t from, void *x, size_t n, size_t size, MPI_Datatype type
 
 void vgi_ranks_share(size_t from, float *x, size_t n)
 {
-    if (vgi_ranks() > 1) share(from, x, n, sizeof *x, MPI_FLOAT);
+    if (vgi_ranks() > 1) broadcast(from, x, n, sizeof *x, MPI_FLOAT);
 }
 
 void vgi_ranks_share_double(size_t from, double *x, size_t n)
 {
-    if (vgi_ranks() > 1) share(from, x, n, sizeof *x, MPI_DOUBLE);
+    if (vgi_ranks() > 1) broadcast(from, x, n, sizeof *x, MPI_DOUBLE);
 }
 
 bool vgi_ranks_any(bool yes)

@@ -27,7 +27,7 @@ static void give(const void *context, size_t t, net_lanes *frame)
 }
 
 /* gradient of the distance between the last frame and the target */
-static void pull(void *context, size_t t, net_lanes *g)
+static void add_distance_gradient(void *context, size_t t, net_lanes *g)
 {
     const reaching *j = context;
     size_t n = j->r->shape.numbers;
@@ -37,7 +37,7 @@ static void pull(void *context, size_t t, net_lanes *g)
         for (int i = 0; i < NET_LANES; i++) g[k][i] += (real)(((double)last[k][i] - j->target[k]) / j->far[i]);
 }
 
-static void measure(reaching *j)
+static void measure_gradient(reaching *j)
 {
     size_t n = j->r->shape.numbers;
     const net_lanes *last = j->chains.state + (j->chains.steps - 1) * n;
@@ -48,7 +48,7 @@ static void measure(reaching *j)
     }
 }
 
-static void look(void *context, double *const *x, double *f, double *const *g)
+static void evaluate_distance(void *context, double *const *x, double *f, double *const *g)
 {
     reaching *j = context;
     size_t rows = 2 * j->r->shape.layers * j->r->shape.hidden;
@@ -57,8 +57,8 @@ static void look(void *context, double *const *x, double *f, double *const *g)
         for (int i = 0; i < NET_LANES; i++) j->start[k][i] = (real)x[i][k];
     net_chains_begin(&j->chains, j->start);
     net_chains_forward(&j->chains, &j->drive);
-    measure(j);
-    net_chains_backward(&j->chains, &j->drive, pull, j, 0, &none, j->ignored, j->slope);
+    measure_gradient(j);
+    net_chains_backward(&j->chains, &j->drive, add_distance_gradient, j, 0, &none, j->ignored, j->slope);
     for (int i = 0; i < NET_LANES; i++) {
         f[i] = j->far[i];
         for (size_t k = 0; k < rows; k++) g[i][k] = (double)j->slope[k][i];
@@ -78,7 +78,7 @@ static size_t take_given(reaching *j, size_t given, const double *in)
     return first + given;
 }
 
-static int prepare(reaching *j, size_t given, const double *in, size_t n, vg_err *e)
+static int prepare_reaching(reaching *j, size_t given, const double *in, size_t n, vg_err *e)
 {
     vgi_runner *runner = j->r;
     size_t rows = 2 * runner->shape.layers * runner->shape.hidden;
@@ -98,10 +98,10 @@ int vgi_runner_reach(vgi_runner *runner, size_t given, const double *in, size_t 
 {
     reaching j = {.r = runner, .target = target};
     size_t rows = 2 * runner->shape.layers * runner->shape.hidden;
-    vgi_function f = {.n = rows, .look = look, .context = &j};
+    vgi_function f = {.n = rows, .look = evaluate_distance, .context = &j};
     vgi_minimum m;
     double *x = vgi_array_raw(rows, sizeof *x, e);
-    int r = x ? prepare(&j, given, in, n, e) : VG_ENOMEM;
+    int r = x ? prepare_reaching(&j, given, in, n, e) : VG_ENOMEM;
     if (r == VG_OK) {
         for (size_t k = 0; k < rows; k++) x[k] = (double)runner->start[k][0];
         vgi_blas_alone();

@@ -148,7 +148,7 @@ static int fit_first(vgi_regression *g, size_t rows, double *z, double *y, doubl
         vgi_product_transposed_double(w, n, rows, z, 2 * n + 1, y, n, x, n);
     }
     for (size_t i = 0; i < w; i++) a[i * w + i] += ridge * (double)(rows ? rows : 1) * (i < n ? 1 : free_shift);
-    int r = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave a regression open");
+    int r = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames do not determine the regression");
     if (r == VG_OK) {
         vgi_spd_solve(w, a, n, x);
         memcpy(g->first, x, n * n * sizeof *x);
@@ -159,7 +159,7 @@ static int fit_first(vgi_regression *g, size_t rows, double *z, double *y, doubl
 }
 
 /* The fit before stabilisation. */
-static int fit(vgi_regression *g, const vgi_frames *f, bool back, double size, const vgi_choice *choice, vg_err *e)
+static int fit_unstabilised(vgi_regression *g, const vgi_frames *f, bool back, double size, const vgi_choice *choice, vg_err *e)
 {
     size_t n = f->numbers, w = 2 * n + 1, rows = count_rows(f);
     double damping = choice->damping, *z = vgi_array_raw(rows * (w + n) + w * w + w * n, sizeof *z, e);
@@ -173,7 +173,7 @@ static int fit(vgi_regression *g, const vgi_frames *f, bool back, double size, c
     }
     for (size_t i = 0; i < w; i++)
         a[i * w + i] += choice->ridge * (double)(rows ? rows : 1) * (i < 2 * n ? 1 : free_shift);
-    int r = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave a regression open");
+    int r = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames do not determine the regression");
     if (r == VG_OK) {
         vgi_spd_solve(w, a, n, x);
         for (size_t i = 0; i < n; i++)
@@ -191,7 +191,7 @@ static int fit(vgi_regression *g, const vgi_frames *f, bool back, double size, c
 int vgi_regression_fit(vgi_regression *g, const vgi_frames *f, bool back, double size, const vgi_choice *choice,
                        vg_err *e)
 {
-    int r = fit(g, f, back, size, choice, e);
+    int r = fit_unstabilised(g, f, back, size, choice, e);
     return r == VG_OK ? make_stable(g, e) : r;
 }
 
@@ -252,9 +252,9 @@ static void try_one(void *context, size_t task)
     vgi_regression g = {0}, back = {0};
     double *room = vgi_array_raw(3 * n, sizeof *room, NULL);
     int r = room ? vgi_regression_make(&g, n, NULL) : VG_ENOMEM;
-    if (r == VG_OK) r = fit(&g, &f->fitted, false, c->size, choice, NULL);
+    if (r == VG_OK) r = fit_unstabilised(&g, &f->fitted, false, c->size, choice, NULL);
     if (r == VG_OK && c->first) r = vgi_regression_make(&back, n, NULL);
-    if (r == VG_OK && c->first) r = fit(&back, &f->fitted, true, c->size, choice, NULL);
+    if (r == VG_OK && c->first) r = fit_unstabilised(&back, &f->fitted, true, c->size, choice, NULL);
     c->found[task] = r == VG_OK ? try_out(&g, c->first ? &back : NULL, &f->tried, room) : (trial_sum){INFINITY, 1};
     c->code[task] = r;
     vgi_regression_clear(&g);
@@ -263,7 +263,7 @@ static void try_one(void *context, size_t task)
 }
 
 /* Pick the best choice over all folds; unchanged if there is nothing to try it on. */
-static int pick(choosing *c, size_t folds, int threads, vgi_choice *best, vg_err *e)
+static int pick_choice(choosing *c, size_t folds, int threads, vgi_choice *best, vg_err *e)
 {
     c->found = vgi_array(folds * c->n, sizeof *c->found, e);
     c->code = vgi_array(folds * c->n, sizeof *c->code, e);
@@ -298,7 +298,7 @@ int vgi_regression_choose(const vgi_fold *folds, size_t n, double size, int thre
             if (first) all[i].first_ridge = ridges[i];
             else all[i].ridge = ridges[i / DAMPINGS], all[i].damping = dampings[i % DAMPINGS], all[i].first_ridge = all[i].ridge;
         }
-        r = pick(&c, n, threads, choice, e);
+        r = pick_choice(&c, n, threads, choice, e);
         free(c.found);
         free(c.code);
     }

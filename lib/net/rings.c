@@ -15,7 +15,7 @@
 static const double least_weight = 0.05, most_weight = 20, singular = 1e-9, ball_share = 0.15;
 enum { BALL_LEAST = 7, SWEEPS = 24 };
 
-static const double *point(const vgi_rings *x, size_t v)
+static const double *reference_point(const vgi_rings *x, size_t v)
 {
     return x->reference + 3 * v;
 }
@@ -34,8 +34,8 @@ static double worst_of_fan(const vgi_rings *x, const uint32_t *vert, size_t n, s
 {
     double worst = INFINITY;
     for (size_t i = 1; i + 1 < n; i++)
-        worst = fmin(worst, quality(point(x, vert[from]), point(x, vert[(from + i) % n]),
-                                    point(x, vert[(from + i + 1) % n])));
+        worst = fmin(worst, quality(reference_point(x, vert[from]), reference_point(x, vert[(from + i) % n]),
+                                    reference_point(x, vert[(from + i + 1) % n])));
     return worst;
 }
 
@@ -86,7 +86,7 @@ static int list_edges(const vgi_rings *x, const vg_mesh *m, vgi_edges *list, vg_
         const uint32_t *t = x->triangle + 3 * i;
         for (int k = 0; k < 3 && r == VG_OK; k++) {
             uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
-            r = vgi_edges_add(list, b, c, cotangent(point(x, a), point(x, b), point(x, c)) / 2, OF_TRIANGLE, e);
+            r = vgi_edges_add(list, b, c, cotangent(reference_point(x, a), reference_point(x, b), reference_point(x, c)) / 2, OF_TRIANGLE, e);
         }
     }
     for (size_t f = 0; f < m->nf && r == VG_OK; f++) {
@@ -111,7 +111,7 @@ static int make_edges(vgi_rings *x, const vg_mesh *m, vg_err *e)
         L.weight[i] = L.kinds[i] == OF_SEGMENT ? 1 : fmin(fmax(L.weight[i], least_weight), most_weight);
     for (size_t v = 0; x->edge && v < x->nv; v++)
         for (uint32_t i = L.first[v]; i < L.first[v + 1]; i++)
-            vgi_subtract(point(x, v), point(x, L.to[i]), x->edge + 3 * (size_t)i);
+            vgi_subtract(reference_point(x, v), reference_point(x, L.to[i]), x->edge + 3 * (size_t)i);
     x->first = L.first, x->to = L.to, x->weight = L.weight;
     L.first = L.to = NULL, L.weight = NULL;
     vgi_laplacian_clear(&L);
@@ -260,7 +260,7 @@ static void unit_normals(const vgi_rings *x, double *n)
     for (size_t i = 0; i < x->ntriangles; i++) {
         const uint32_t *t = x->triangle + 3 * i;
         double c[3];
-        vgi_triangle_normal(point(x, t[0]), point(x, t[1]), point(x, t[2]), c);
+        vgi_triangle_normal(reference_point(x, t[0]), reference_point(x, t[1]), reference_point(x, t[2]), c);
         for (int j = 0; j < 3; j++) vgi_add(n + 3 * (size_t)t[j], c);
     }
     for (size_t v = 0; v < x->nv; v++) vgi_make_unit(n + 3 * v);
@@ -315,7 +315,7 @@ static void list_laplacian(const vgi_rings *x, const uint32_t *number, vgi_tripl
 }
 
 /* Right-hand sides sum to 0 over a component, so adding 1 to the diagonal of one vertex sets it to 0. */
-static int factorize(vgi_rings *x, vg_err *e)
+static int factorize_laplacian(vgi_rings *x, vg_err *e)
 {
     vgi_triplets t = {0};
     vgi_sparse a = {0};
@@ -356,7 +356,7 @@ int vgi_rings_make(vgi_rings *x, const vg_mesh *m, const double *reference, vg_e
     if (r == VG_OK) r = find_parts(x, m, e);
     if (r == VG_OK) r = find_centres(x, e);
     if (r == VG_OK) r = make_rings(x, e);
-    if (r == VG_OK) r = factorize(x, e);
+    if (r == VG_OK) r = factorize_laplacian(x, e);
     if (r < 0) vgi_rings_clear(x);
     return r;
 }

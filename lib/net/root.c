@@ -56,7 +56,7 @@ void vgi_root_move(const vg_network *n, size_t main_part, const double *steps, d
     }
 }
 
-static void known(const vg_network *n, const double *c, const double *before, double *z)
+static void regressors(const vg_network *n, const double *c, const double *before, double *z)
 {
     size_t k = n->rank;
     double size = n->scale[0];
@@ -87,7 +87,7 @@ int vgi_root_fit(const vgi_dataset *s, vg_network *n, vg_err *e)
     double *y = z + all * rows, *a = y + all * w;
     for (size_t i = 0; i < s->train.n; i++)
         for (size_t t = s->train.at[i].first; t + 1 < s->train.at[i].end; t++, row++) {
-            known(n, s->coordinates + (t + 1) * k, s->coordinates + t * k, z + row * rows);
+            regressors(n, s->coordinates + (t + 1) * k, s->coordinates + t * k, z + row * rows);
             vgi_root_steps(n, s->main_part, s->roots + 4 * t, s->centroids + 3 * s->parts * t, s->roots + 4 * (t + 1),
                            s->centroids + 3 * s->parts * (t + 1), y + row * w);
         }
@@ -97,7 +97,8 @@ int vgi_root_fit(const vgi_dataset *s, vg_network *n, vg_err *e)
         vgi_product_transposed_double(rows, w, row, z, rows, y, w, n->root, w);
     }
     for (size_t i = 0; i < rows; i++) a[i * rows + i] += ridge * (double)(row ? row : 1) * (i < 2 * k ? 1 : 1e-6);
-    int r = vgi_spd_factor(rows, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave the root's steps open");
+    int r = vgi_spd_factor(rows, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames do not determine the steps of the "
+                                                                    "root");
     if (r == VG_OK) vgi_spd_solve(rows, a, w, n->root);
     free(z);
     return r;

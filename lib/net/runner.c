@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 /* A view of a network's regression. */
-static vgi_regression view(const vg_network *n, int back)
+static vgi_regression regression_of(const vg_network *n, int back)
 {
     return vgi_regression_view(n->rank, n->regression + (size_t)back * vgi_regression_size(n->rank));
 }
@@ -16,7 +16,7 @@ static void take_skeletons(vgi_runner *u)
 {
     size_t k = u->net->rank, square = k * k, all = 3 * square + k;
     for (int back = 0; back < 2; back++) {
-        vgi_regression v = view(u->net, back);
+        vgi_regression v = regression_of(u->net, back);
         float *m = u->matrices + (size_t)back * all;
         for (size_t i = 0; i < square; i++) {
             m[i] = (float)v.turn[i], m[square + i] = (float)v.change[i];
@@ -26,7 +26,7 @@ static void take_skeletons(vgi_runner *u)
         u->skeleton[back] = (net_skeleton){.turn = m, .change = m + square, .sum = m + 2 * square, .shift = m + 3 * square};
     }
     u->drive.skeleton = u->skeleton;
-    u->forward = view(u->net, 0), u->backward = view(u->net, 1);
+    u->forward = regression_of(u->net, 0), u->backward = regression_of(u->net, 1);
 }
 
 static int take_numbers(vgi_runner *u, vg_err *e)
@@ -91,7 +91,7 @@ void vgi_runner_begin(vgi_runner *u, bool back)
 }
 
 /* One step from u->now; the layers' memory moves from the second place to the first. */
-static void advance(vgi_runner *u)
+static void advance_runner(vgi_runner *u)
 {
     const vgi_shape *s = &u->shape;
     net_chains *c = &u->chains;
@@ -108,14 +108,14 @@ static void advance(vgi_runner *u)
 
 void vgi_runner_take(vgi_runner *u, const net_lanes *frame)
 {
-    if (u->waiting) advance(u); /* the prediction is replaced by the given frame */
+    if (u->waiting) advance_runner(u); /* the prediction is replaced by the given frame */
     memcpy(u->now, frame, u->shape.numbers * sizeof *frame);
     u->waiting = true;
 }
 
 const net_lanes *vgi_runner_give(vgi_runner *u)
 {
-    advance(u);
+    advance_runner(u);
     return u->now;
 }
 
@@ -139,7 +139,7 @@ bool vgi_runner_reach_back(const vgi_runner *u, const net_lanes *frame, net_lane
 }
 
 /* frame t of all lanes; unused lanes repeat the first */
-static void gather(size_t lanes, size_t n, const double *const *in, size_t t, net_lanes *frame)
+static void gather_frames(size_t lanes, size_t n, const double *const *in, size_t t, net_lanes *frame)
 {
     for (size_t k = 0; k < n; k++)
         for (size_t i = 0; i < NET_LANES; i++) frame[k][i] = (real)in[i < lanes ? i : 0][t * n + k];
@@ -152,13 +152,13 @@ int vgi_runner_go(vgi_runner *u, bool back, size_t lanes, size_t given, const do
     net_lanes *frame = net_array(3 * w, e);
     if (!frame) return VG_ENOMEM;
     vgi_runner_begin(u, back);
-    gather(lanes, w, in, 0, frame);
+    gather_frames(lanes, w, in, 0, frame);
     if (given == 1 && vgi_runner_reach_back(u, frame, frame + w, frame + 2 * w)) {
         vgi_runner_take(u, frame + 2 * w);
         vgi_runner_take(u, frame + w);
     }
     for (size_t t = 0; t < given; t++) {
-        gather(lanes, w, in, t, frame);
+        gather_frames(lanes, w, in, t, frame);
         vgi_runner_take(u, frame);
     }
     for (size_t t = 0; t < n; t++) {

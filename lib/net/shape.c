@@ -8,7 +8,7 @@
 
 enum { MOST_HIDDEN = 4096 };
 
-static bool put(vgi_shape *s, size_t *at, const char *name, size_t number, size_t rows, size_t columns)
+static bool put_parameter(vgi_shape *s, size_t *at, const char *name, size_t number, size_t rows, size_t columns)
 {
     vgi_parameter *p = &s->parameter[s->nparameters++];
     size_t size;
@@ -24,13 +24,13 @@ static bool put_mesh(vgi_shape *s)
     bool ok = true;
     size_t c = s->channels;
     for (size_t k = 0; k < s->convolutions; k++) {
-        ok = ok && put(s, &s->own[k], "convolution own", k, c, c) && put(s, &s->mean[k], "convolution mean", k, c, c);
-        ok = ok && put(s, &s->bias[k], "bias", k, c, 1) && put(s, &s->bias_back[k], "bias back", k, c, 1);
+        ok = ok && put_parameter(s, &s->own[k], "convolution own", k, c, c) && put_parameter(s, &s->mean[k], "convolution mean", k, c, c);
+        ok = ok && put_parameter(s, &s->bias[k], "bias", k, c, 1) && put_parameter(s, &s->bias_back[k], "bias back", k, c, 1);
     }
-    ok = ok && put(s, &s->full, "full", 0, s->numbers, s->latent);
+    ok = ok && put_parameter(s, &s->full, "full", 0, s->numbers, s->latent);
     if (s->uncertain)
-        ok = ok && put(s, &s->variance, "variance", 0, s->numbers, s->latent) &&
-             put(s, &s->variance_bias, "variance bias", 0, s->latent, 1);
+        ok = ok && put_parameter(s, &s->variance, "variance", 0, s->numbers, s->latent) &&
+             put_parameter(s, &s->variance_bias, "variance bias", 0, s->latent, 1);
     return ok;
 }
 
@@ -44,11 +44,11 @@ int vgi_shape_plan(vgi_shape *s, vg_err *e)
     s->total = s->nparameters = 0;
     s->latent = s->front == VGI_FRONT_MESH ? s->hidden : s->numbers;
     if (s->front == VGI_FRONT_MESH) ok = put_mesh(s);
-    else ok = put(s, &s->full, "output", 0, s->hidden, s->numbers) &&
-              put(s, &s->full_bias, "output bias", 0, s->numbers, 1);
+    else ok = put_parameter(s, &s->full, "output", 0, s->hidden, s->numbers) &&
+              put_parameter(s, &s->full_bias, "output bias", 0, s->numbers, 1);
     for (size_t l = 0; l < s->layers; l++)
-        ok = ok && put(s, &s->gates[l], "gates", l, vgi_shape_input(s, l) + s->hidden, 4 * s->hidden) &&
-             put(s, &s->gates_bias[l], "gates bias", l, 4 * s->hidden, 1);
+        ok = ok && put_parameter(s, &s->gates[l], "gates", l, vgi_shape_input(s, l) + s->hidden, 4 * s->hidden) &&
+             put_parameter(s, &s->gates_bias[l], "gates bias", l, 4 * s->hidden, 1);
     return ok ? VG_OK : vg_fail(e, VG_EARG, "a network for %zu numbers is too large", s->numbers);
 }
 

@@ -40,7 +40,7 @@ static int check_options(const vg_train_options *o, vg_err *e)
         return vg_fail(e, VG_EARG, "there is no such network");
     if (!o->batch || o->frames < 3 || !o->step || !o->given_least || o->given_least > o->given_most ||
         o->given_most >= o->frames || !o->coordinates || !(o->hold >= 0 && o->hold < 1) || !(o->rate > 0))
-        return vg_fail(e, VG_EARG, "impossible options of training");
+        return vg_fail(e, VG_EARG, "invalid training options");
     return VG_OK;
 }
 
@@ -278,7 +278,7 @@ static int find_windows(vg_trainer *t, vg_err *e)
     }
     t->length = t->o.frames < longest ? t->o.frames : longest;
     if (t->length <= t->o.given_least || t->length < 3)
-        return vg_fail(e, VG_EINPUT, "the longest run of frames to learn from is %zu: that is too short", longest);
+        return vg_fail(e, VG_EINPUT, "the longest run of frames for training is %zu, which is too short", longest);
     for (size_t i = 0; i < t->fitted.n; i++)
         for (size_t w = t->fitted.at[i].first; w + t->length <= t->fitted.at[i].end; w++) {
             if (vgi_grow(&t->window, &cap, t->nwindows + 1, sizeof *t->window, e) < 0) return VG_ENOMEM;
@@ -475,7 +475,7 @@ static double length_of(const float *g, size_t n)
     return sqrt(sum);
 }
 
-static void learn(vg_trainer *t)
+static void train_iteration(vg_trainer *t)
 {
     size_t all = t->net.sets * t->net.nparameters;
     double done = (double)t->state.iteration, share = done / (double)t->o.iterations;
@@ -585,10 +585,10 @@ int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
     }
     r = run_groups(t, &loss, e);
     if (r < 0) return r;
-    learn(t);
+    train_iteration(t);
     t->state.loss = loss;
     if (!(t->state.gradient < 1e30) || !(loss < 1e30))
-        return vg_fail(e, VG_EINPUT, "the numbers run away at iteration %llu: choose a smaller --rate",
+        return vg_fail(e, VG_EINPUT, "training diverges at iteration %llu: choose a smaller --rate",
                        (unsigned long long)t->state.iteration);
     t->state.iteration++;
     t->net.iterations = t->state.iteration;

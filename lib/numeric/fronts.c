@@ -270,7 +270,7 @@ static void add_update(const elimination *x, size_t s, size_t m, size_t c, doubl
 }
 
 /* Eliminate front s; l and u receive its block and its update. */
-static int eliminate(const elimination *x, size_t s, double *l, double *u, vg_err *e)
+static int eliminate_front(const elimination *x, size_t s, double *l, double *u, vg_err *e)
 {
     size_t m = x->front[s].rows, c = x->front[s].columns, left = m - c;
     memset(l, 0, m * c * sizeof *l);
@@ -319,7 +319,7 @@ static void clear_elimination(elimination *x)
 
 /* ---- shared data: numbers ---- */
 
-static int share(vgi_fronts *b, vg_err *e)
+static int compute_shared(vgi_fronts *b, vg_err *e)
 {
     elimination x;
     size_t n = count_shared(b);
@@ -333,7 +333,7 @@ static int share(vgi_fronts *b, vg_err *e)
     for (size_t s = 0; r == VG_OK && s < b->base.supernodes; s++) {
         x.front[s] = (front){.rows = rows_of(&b->f, s), .columns = columns_of(&b->f, s)};
         if (is_of_base(b, s)) find_update(&x, s, (double *)b->update[s]);
-        else r = eliminate(&x, s, (double *)b->block[s], (double *)b->update[s], e);
+        else r = eliminate_front(&x, s, (double *)b->block[s], (double *)b->update[s], e);
     }
     clear_elimination(&x);
     return r;
@@ -347,7 +347,7 @@ int vgi_fronts_new(vgi_fronts **out, const vgi_sparse *a, const vgi_cholesky *c,
     int r = make_supernodes(b, c, border, e);
     if (r == VG_OK) r = make_tree(b, e);
     if (r == VG_OK) r = permute_matrix(b, a, c, border, e);
-    if (r == VG_OK) r = share(b, e);
+    if (r == VG_OK) r = compute_shared(b, e);
     if (r < 0) vgi_fronts_free(out);
     return r;
 }
@@ -458,7 +458,7 @@ static void drop_rows(const elimination *x, size_t s, double *to)
             if (!is_held(x, f->rows[(size_t)f->pi[s] + i])) *to++ = from[i];
 }
 
-static int factorize(elimination *x, const vgi_held_factor *out, vg_err *e)
+static int factorize_held(elimination *x, const vgi_held_factor *out, vg_err *e)
 {
     double *at = out->values, *top = x->stack;
     int r = VG_OK;
@@ -467,7 +467,7 @@ static int factorize(elimination *x, const vgi_held_factor *out, vg_err *e)
         size_t left = t->rows - t->columns;
         if (t->changed) {
             double *u = top;
-            r = eliminate(x, s, at, u, e);
+            r = eliminate_front(x, s, at, u, e);
             top -= count_taken(x, s);
             memmove(top, u, left * left * sizeof *u);
             x->update[s] = top;
@@ -496,7 +496,7 @@ int vgi_fronts_hold(const vgi_fronts *b, const bool *held, vgi_held_factor *out,
         r = make_stack(&x, e);
     }
     if (r == VG_OK) r = make_factor(&x, out, e);
-    if (r == VG_OK) r = factorize(&x, out, e);
+    if (r == VG_OK) r = factorize_held(&x, out, e);
     clear_elimination(&x);
     if (r < 0) vgi_held_factor_clear(out);
     return r;

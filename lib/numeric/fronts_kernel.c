@@ -67,7 +67,7 @@ static void update(size_t n, size_t rows, size_t depth, const double *a, size_t 
 }
 
 /* Finish columns j .. j + n - 1 of l; those before them are done and applied. */
-static bool finish(size_t m, size_t j, size_t n, double *l)
+static bool finish_columns(size_t m, size_t j, size_t n, double *l)
 {
     for (size_t q = 0; q < n; q++) {
         double *column = l + (j + q) * m;
@@ -85,7 +85,7 @@ static bool finish(size_t m, size_t j, size_t n, double *l)
     return true;
 }
 
-static void complete(size_t m, size_t c, const double *l, double *u)
+static void complete_front(size_t m, size_t c, const double *l, double *u)
 {
     for (size_t j = 0, left = m - c; c && j < left; j += COLUMNS) {
         size_t n = left - j < COLUMNS ? left - j : COLUMNS;
@@ -93,14 +93,14 @@ static void complete(size_t m, size_t c, const double *l, double *u)
     }
 }
 
-static size_t eliminate(size_t m, size_t c, double *l, double *u)
+static size_t eliminate_columns(size_t m, size_t c, double *l, double *u)
 {
     for (size_t j = 0; j < c; j += COLUMNS) {
         size_t n = c - j < COLUMNS ? c - j : COLUMNS;
         if (j) update(n, m - j, j, l + j, m, l + j, m, l + j * m + j, m);
-        if (!finish(m, j, n, l)) return j;
+        if (!finish_columns(m, j, n, l)) return j;
     }
-    complete(m, c, l, u);
+    complete_front(m, c, l, u);
     return c;
 }
 
@@ -128,4 +128,4 @@ static void scatter(size_t n, const uint32_t *at, const uint32_t *to, uint32_t *
     }
 }
 
-const vgi_fronts_kernel VGI_OF_SET(vgi_fronts_kernel) = {eliminate, complete, scatter};
+const vgi_fronts_kernel VGI_OF_SET(vgi_fronts_kernel) = {eliminate_columns, complete_front, scatter};

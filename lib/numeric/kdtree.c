@@ -49,12 +49,12 @@ static void node_range(const vgi_kdtree *t, uint64_t node, int depth, size_t *be
 /* ---- building ---- */
 
 /* A total order along an axis: equal coordinates are ordered by index, so that coincident points split too. */
-static inline bool before(const struct point *a, const struct point *b, int axis)
+static inline bool point_before(const struct point *a, const struct point *b, int axis)
 {
     return a->x[axis] < b->x[axis] || (a->x[axis] == b->x[axis] && a->index < b->index);
 }
 
-static inline void swap(struct point *a, struct point *b)
+static inline void swap_points(struct point *a, struct point *b)
 {
     struct point c = *a;
     *a = *b;
@@ -66,9 +66,9 @@ static struct point choose_pivot(const struct point *p, size_t n, int axis, vgi_
 {
     const struct point *three[3];
     for (int k = 0; k < 3; k++) three[k] = p + vgi_random_below(random, n);
-    int low = before(three[1], three[0], axis), high = !low;
-    if (before(three[2], three[low], axis)) return *three[low];
-    return before(three[2], three[high], axis) ? *three[2] : *three[high];
+    int low = point_before(three[1], three[0], axis), high = !low;
+    if (point_before(three[2], three[low], axis)) return *three[low];
+    return point_before(three[2], three[high], axis) ? *three[2] : *three[high];
 }
 
 /* Hoare's selection: move the point of rank `middle` to its position, and smaller ones before it. */
@@ -80,10 +80,10 @@ static void select_rank(struct point *p, size_t n, size_t middle, int axis)
         struct point pivot = choose_pivot(p + begin, end - begin, axis, &random);
         size_t i = begin, j = end - 1;
         for (;;) {
-            while (before(&p[i], &pivot, axis)) i++;
-            while (before(&pivot, &p[j], axis)) j--;
+            while (point_before(&p[i], &pivot, axis)) i++;
+            while (point_before(&pivot, &p[j], axis)) j--;
             if (i >= j) break;
-            swap(&p[i++], &p[j--]);
+            swap_points(&p[i++], &p[j--]);
         }
         /* now no point before i is above the pivot and none after j is below it; j is i - 1, or i at the pivot
          * itself */
@@ -216,7 +216,7 @@ static inline bool nearer(double square, uint32_t index, const vgi_near *than)
     return square < than->square || (square == than->square && index < than->index);
 }
 
-static void keep(struct query *q, double square, uint32_t index)
+static void keep_nearest(struct query *q, double square, uint32_t index)
 {
     size_t i = q->k - 1;
     for (; i > 0 && nearer(square, index, &q->near[i - 1]); i--) q->near[i] = q->near[i - 1];
@@ -230,7 +230,7 @@ static void search_leaf(const vgi_kdtree *t, uint64_t node, struct query *q)
     for (const struct point *a = t->point + begin; a < t->point + end; a++) {
         if (a->label == q->not_label) continue;
         double square = square_sum(a->x[0] - q->p[0], a->x[1] - q->p[1], a->x[2] - q->p[2]);
-        if (nearer(square, a->index, &q->near[q->k - 1])) keep(q, square, a->index);
+        if (nearer(square, a->index, &q->near[q->k - 1])) keep_nearest(q, square, a->index);
     }
 }
 

@@ -47,7 +47,7 @@ int vgi_lu_factor(size_t n, double *a, int *pivot, vg_err *e)
                      "a dense system of %zu unknowns is singular", e);
 }
 
-static void transpose(size_t rows, size_t columns, const double *from, double *to)
+static void transpose_matrix(size_t rows, size_t columns, const double *from, double *to)
 {
     for (size_t i = 0; i < rows; i++)
         for (size_t k = 0; k < columns; k++) to[k * rows + i] = from[i * columns + k];
@@ -59,11 +59,11 @@ int vgi_lu_solve(size_t n, const double *lu, const int *pivot, size_t m, double 
     if (!n || !m) return VG_OK;
     double *y = m > 1 ? vgi_array_raw(n, m * sizeof *y, e) : x;
     if (!y) return VG_ENOMEM;
-    if (m > 1) transpose(n, m, x, y);
+    if (m > 1) transpose_matrix(n, m, x, y);
     lapack_int info = LAPACKE_dgetrs(LAPACK_COL_MAJOR, 'T', (lapack_int)n, (lapack_int)m, lu, (lapack_int)n, pivot, y,
                                      (lapack_int)n);
     if (m > 1) {
-        transpose(m, n, y, x);
+        transpose_matrix(m, n, y, x);
         free(y);
     }
     return status_of(info, n, "", e);

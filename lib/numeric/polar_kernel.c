@@ -21,7 +21,7 @@ VGI_INLINE void face_matrix(const vgi_turns *t, size_t f, const double *const *p
         for (size_t k = 0; k < 3; k++) m[3 * i + k] += n[i] * weight * vgi_same(t->normal[3 * f + k]);
 }
 
-static void measure(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes *rotation)
+static void measure_face(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes *rotation)
 {
     for (size_t part = 0; part < VGI_PARTS; part++) {
         vgi_wide m[9], x[9];
@@ -31,4 +31,4 @@ static void measure(const vgi_turns *t, size_t f, const double *const *poses, vg
     }
 }
 
-const vgi_polar_kernel VGI_OF_SET(vgi_polar_kernel) = {measure};
+const vgi_polar_kernel VGI_OF_SET(vgi_polar_kernel) = {measure_face};

@@ -40,7 +40,7 @@ VGI_INLINE void store_sums(double *row, const sums *s)
 }
 
 /* s[i] -= entry[i * apart] row, for n sums. Each number of the row is loaded once for all of them. */
-VGI_INLINE void subtract(sums *s, int n, const double *entry, size_t apart, const double *row)
+VGI_INLINE void subtract_scaled(sums *s, int n, const double *entry, size_t apart, const double *row)
 {
     vgi_wide factor[TOGETHER];
 #pragma GCC unroll 4
@@ -53,7 +53,7 @@ VGI_INLINE void subtract(sums *s, int n, const double *entry, size_t apart, cons
     }
 }
 
-VGI_INLINE void scale(sums *s, double factor)
+VGI_INLINE void scale_sums(sums *s, double factor)
 {
     vgi_wide f = vgi_same(factor);
 #pragma GCC unroll 12
@@ -67,7 +67,7 @@ VGI_INLINE void eliminate_rows(const double *l, size_t stride, size_t columns, c
     sums s[TOGETHER];
 #pragma GCC unroll 4
     for (int i = 0; i < n; i++) s[i] = load_sums(target[i]);
-    for (size_t k = 0; k < columns; k++) subtract(s, n, l + k * stride, 1, x + k * ROW);
+    for (size_t k = 0; k < columns; k++) subtract_scaled(s, n, l + k * stride, 1, x + k * ROW);
 #pragma GCC unroll 4
     for (int i = 0; i < n; i++) store_sums(target[i], &s[i]);
 }
@@ -80,17 +80,17 @@ VGI_INLINE void eliminate_head(const double *l, size_t stride, size_t columns, d
     for (; i + 2 <= columns; i += 2) {
         double *first = head + i * ROW, *second = first + ROW;
         sums s[2] = {load_sums(first), load_sums(second)};
-        for (size_t k = 0; k < i; k++) subtract(s, 2, l + k * stride + i, 1, head + k * ROW);
-        scale(&s[0], 1 / l[i * stride + i]);
+        for (size_t k = 0; k < i; k++) subtract_scaled(s, 2, l + k * stride + i, 1, head + k * ROW);
+        scale_sums(&s[0], 1 / l[i * stride + i]);
         store_sums(first, &s[0]);
-        subtract(&s[1], 1, l + i * stride + i + 1, 1, first);
-        scale(&s[1], 1 / l[(i + 1) * stride + i + 1]);
+        subtract_scaled(&s[1], 1, l + i * stride + i + 1, 1, first);
+        scale_sums(&s[1], 1 / l[(i + 1) * stride + i + 1]);
         store_sums(second, &s[1]);
     }
     if (i == columns) return;
     sums s = load_sums(head + i * ROW);
-    for (size_t k = 0; k < i; k++) subtract(&s, 1, l + k * stride + i, 1, head + k * ROW);
-    scale(&s, 1 / l[i * stride + i]);
+    for (size_t k = 0; k < i; k++) subtract_scaled(&s, 1, l + k * stride + i, 1, head + k * ROW);
+    scale_sums(&s, 1 / l[i * stride + i]);
     store_sums(head + i * ROW, &s);
 }
 
@@ -121,7 +121,7 @@ VGI_INLINE void forward(const vgi_factor *f, double *x)
 VGI_INLINE void gather_below(sums *s, int n, const double *l, size_t stride, size_t columns, const int *rows,
                              const double *x)
 {
-    for (size_t i = stride; i-- > columns;) subtract(s, n, l + i, stride, x + (size_t)rows[i] * ROW);
+    for (size_t i = stride; i-- > columns;) subtract_scaled(s, n, l + i, stride, x + (size_t)rows[i] * ROW);
 }
 
 /* Finish columns k .. k + n - 1 of a supernode in turn; those after them are done. */
@@ -133,14 +133,14 @@ VGI_INLINE void finish_columns(const double *l, size_t stride, size_t columns, c
 #pragma GCC unroll 4
     for (int i = 0; i < n; i++) s[i] = load_sums(head + (k + (size_t)i) * ROW);
     gather_below(s, n, l, stride, columns, rows, x);
-    for (size_t j = columns; j-- > k + (size_t)n;) subtract(s, n, l + j, stride, head + j * ROW);
+    for (size_t j = columns; j-- > k + (size_t)n;) subtract_scaled(s, n, l + j, stride, head + j * ROW);
 #pragma GCC unroll 4
     for (int i = n; i-- > 0;) {
         double *at = head + (k + (size_t)i) * ROW;
 #pragma GCC unroll 4
         for (int j = n; j-- > i + 1;)
-            subtract(&s[i], 1, l + (size_t)i * stride + k + (size_t)j, 0, head + (k + (size_t)j) * ROW);
-        scale(&s[i], 1 / l[(size_t)i * stride + k + (size_t)i]);
+            subtract_scaled(&s[i], 1, l + (size_t)i * stride + k + (size_t)j, 0, head + (k + (size_t)j) * ROW);
+        scale_sums(&s[i], 1 / l[(size_t)i * stride + k + (size_t)i]);
         store_sums(at, &s[i]);
     }
 }
@@ -159,7 +159,7 @@ VGI_INLINE void backward(const vgi_factor *f, double *x)
     }
 }
 
-static void solve(const vgi_factor *f, vgi_row *x)
+static void solve_poses(const vgi_factor *f, vgi_row *x)
 {
     for (size_t share = 0; share < SHARES; share++) {
         forward(f, (double *)x + share * SHARE);
@@ -337,4 +337,4 @@ static void add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t ro
     }
 }
 
-const vgi_solve_kernel VGI_OF_SET(vgi_solve_kernel) = {solve, solve_one, load_rows, add_rows};
+const vgi_solve_kernel VGI_OF_SET(vgi_solve_kernel) = {solve_poses, solve_one, load_rows, add_rows};

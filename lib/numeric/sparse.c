@@ -121,7 +121,7 @@ int vgi_triplets_sum(const vgi_triplets *t, size_t rows, vgi_sparse *a, vg_err *
 /* ---- factorisation ---- */
 
 /* a as a CHOLMOD matrix, borrowed. */
-static cholmod_sparse view(const vgi_sparse *a)
+static cholmod_sparse cholmod_view(const vgi_sparse *a)
 {
     return (cholmod_sparse){.nrow = a->n, .ncol = a->n, .nzmax = (size_t)a->start[a->n], .p = a->start, .i = a->row,
                             .x = a->value, .stype = -1, .itype = CHOLMOD_INT, .xtype = CHOLMOD_REAL,
@@ -155,7 +155,7 @@ int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, int *order, vg_err
     c->common.method[0].ordering = order ? CHOLMOD_GIVEN : a->n < SMALL ? CHOLMOD_AMD : CHOLMOD_METIS;
     c->common.postorder = 1;
     c->common.supernodal = CHOLMOD_SUPERNODAL;
-    cholmod_sparse A = view(a);
+    cholmod_sparse A = cholmod_view(a);
     int before = begin_alone();
     c->L = cholmod_analyze_p(&A, order, NULL, 0, &c->common);
     end_alone(before);
@@ -181,7 +181,7 @@ void vgi_cholesky_free(vgi_cholesky **out)
 
 int vgi_cholesky_factorize(vgi_cholesky *c, const vgi_sparse *a, vg_err *e)
 {
-    cholmod_sparse A = view(a);
+    cholmod_sparse A = cholmod_view(a);
     int before = begin_alone();
     cholmod_factorize(&A, c->L, &c->common);
     end_alone(before);

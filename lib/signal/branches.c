@@ -53,7 +53,7 @@ static void keep_pair(forest *f, uint32_t i)
     }
 }
 
-static void join(forest *f, const double *cost)
+static void join_pairs(forest *f, const double *cost)
 {
     for (size_t i = 0; i < f->npairs; i++) f->ranks[i] = (ranked){cost[i], (uint32_t)i};
     qsort(f->ranks, f->npairs, sizeof *f->ranks, by_key);
@@ -107,7 +107,7 @@ int vgi_branches_make(vgi_branches *b, size_t n, const double *share, size_t npa
         (f.ranks = vgi_array(most, sizeof *f.ranks, e)) && (f.set = vgi_array(n, sizeof *f.set, e)) &&
         (f.next = vgi_array(npairs, 2 * sizeof *f.next, e)) && (f.head = vgi_array(n, sizeof *f.head, e)) &&
         (f.reached = vgi_array(n, sizeof *f.reached, e))) {
-        join(&f, cost);
+        join_pairs(&f, cost);
         walk_trees(&f);
         r = VG_OK;
     }

@@ -15,7 +15,7 @@ void vg_retime_clear(vg_retime *r)
     *r = (vg_retime){0};
 }
 
-static int grow(double **x, size_t n, vg_err *e)
+static int grow_times(double **x, size_t n, vg_err *e)
 {
     double *more = realloc(*x, n * sizeof *more);
     if (!more) return vg_fail(e, VG_ENOMEM, "not enough memory for %zu times", n);
@@ -33,7 +33,7 @@ int vg_retime_add(vg_retime *r, double old_time, double new_time, vg_err *e)
     if (at < r->n && !(r->old_time[at] >= old_time))
         return vg_fail(e, VG_EINPUT, "time %g at new time %g does not come before time %g at %g", old_time, new_time,
                        r->old_time[at], r->new_time[at]);
-    if (grow(&r->old_time, r->n + 1, e) < 0 || grow(&r->new_time, r->n + 1, e) < 0) return VG_ENOMEM;
+    if (grow_times(&r->old_time, r->n + 1, e) < 0 || grow_times(&r->new_time, r->n + 1, e) < 0) return VG_ENOMEM;
     memmove(r->old_time + at + 1, r->old_time + at, (r->n - at) * sizeof(double));
     memmove(r->new_time + at + 1, r->new_time + at, (r->n - at) * sizeof(double));
     r->old_time[at] = old_time, r->new_time[at] = new_time;
@@ -116,7 +116,7 @@ static int change_site(editing *x, const double *number, vg_err *e)
         s->site[s->l++] = (uint32_t)i;
         return VG_OK;
     }
-    if (at == s->l) return vg_fail(e, VG_EINPUT, "%s: frame %zu is no site", x->where, i + 1);
+    if (at == s->l) return vg_fail(e, VG_EINPUT, "%s: frame %zu is not a site", x->where, i + 1);
     if (s->l == 1) return vg_fail(e, VG_EINPUT, "%s: the last site cannot be removed", x->where);
     memmove(s->site + at, s->site + at + 1, (s->l - at - 1) * sizeof *s->site);
     s->l--;
@@ -166,13 +166,13 @@ static int apply_line(editing *x, const char *line, vg_err *e)
     double number[3];
     for (int i = 0; i < v->numbers; i++) {
         char *end;
-        if (!next_word(&line, &word)) return vg_fail(e, VG_EINPUT, "%s: %s is wanted", x->where, v->usage);
+        if (!next_word(&line, &word)) return vg_fail(e, VG_EINPUT, "%s: %s expected", x->where, v->usage);
         number[i] = strtod(word, &end);
         if (end != line || !isfinite(number[i]) || fabs(number[i]) > 1e100)
-            return vg_fail(e, VG_EINPUT, "%s: '%.*s' is no number that can stand here: %s is wanted", x->where,
+            return vg_fail(e, VG_EINPUT, "%s: '%.*s' is not valid here: %s expected", x->where,
                            (int)(line - word < 40 ? line - word : 40), word, v->usage);
     }
-    if (next_word(&line, &word)) return vg_fail(e, VG_EINPUT, "%s: %s is wanted, and nothing more", x->where, v->usage);
+    if (next_word(&line, &word)) return vg_fail(e, VG_EINPUT, "%s: %s expected, and nothing more", x->where, v->usage);
     return v->apply(x, number, e);
 }
 
@@ -189,7 +189,7 @@ int vg_signal_edit(vg_signal *s, vg_retime *retime, const char *text, size_t siz
         const char *comment = memchr(p, '#', n);
         size_t kept = comment ? (size_t)(comment - p) : n;
         snprintf(where, sizeof where, "'%.150s' line %zu", name, ++number);
-        if (kept >= sizeof line || memchr(p, 0, kept)) r = vg_fail(e, VG_EINPUT, "%s: this is no line of an edit", where);
+        if (kept >= sizeof line || memchr(p, 0, kept)) r = vg_fail(e, VG_EINPUT, "%s: this is not an edit", where);
         else {
             memcpy(line, p, kept);
             line[kept] = 0;

@@ -57,7 +57,7 @@ static void set_weights(vg_corrector *c)
 }
 
 /* Rotations and stretches of a pose's corners, without the rigid motion of the body. */
-static void measure(vg_corrector *c, const double *pose, double *feature)
+static void measure_feature(vg_corrector *c, const double *pose, double *feature)
 {
     size_t nv = c->source->faces.nv;
     double turn[4], shift[3];
@@ -87,8 +87,8 @@ static int factor(vg_corrector *c, vg_err *e)
     for (size_t i = 0; i < c->n && definite; i++) /* the component of example i outside the span of those before it */
         definite = c->factor[i * c->n + i] * c->factor[i * c->n + i] > 1e-10 * most;
     if (definite) return VG_OK;
-    return vg_fail(e, VG_EINPUT, "the examples are not independent: one of them is the reference pose, or follows from the "
-                   "others");
+    return vg_fail(e, VG_EINPUT, "the examples are not independent: one of them is the reference pose, or is a "
+                                 "combination of the others");
 }
 
 /* Rotations of the target's corners, from its vectors. */
@@ -138,7 +138,7 @@ int vg_corrector_new(vg_corrector **out, const vg_graph *source, const double *s
     if (r == VG_OK) r = vg_deformer_new(&c->of_target, target, target_reference, threads, e);
     if (r == VG_OK) {
         set_weights(c);
-        for (size_t j = 0; j < c->n; j++) measure(c, examples->source[j], c->feature + 4 * c->from * j);
+        for (size_t j = 0; j < c->n; j++) measure_feature(c, examples->source[j], c->feature + 4 * c->from * j);
         r = factor(c, e);
     }
     for (size_t j = 0; r == VG_OK && j < c->n; j++) {
@@ -151,7 +151,7 @@ int vg_corrector_new(vg_corrector **out, const vg_graph *source, const double *s
 
 void vg_corrector_apply(vg_corrector *c, const double *pose, double *vectors)
 {
-    measure(c, pose, c->now);
+    measure_feature(c, pose, c->now);
     for (size_t j = 0; j < c->n; j++) c->x[j] = vgi_inner(c->now, c->feature + 4 * c->from * j, 4 * c->from);
     vgi_spd_solve(c->n, c->factor, 1, c->x);
     turns_of(c, vectors);

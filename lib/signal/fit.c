@@ -260,15 +260,15 @@ static int keep_shapes(fitting *f, vg_err *e)
     return f->o->bits && f->o->bits != 64 ? vg_signal_store(s, f->o->bits, e) : VG_OK;
 }
 
-static int check(const vg_body *body, size_t n, const vg_signal_options *o, vg_err *e)
+static int check_options(const vg_body *body, size_t n, const vg_signal_options *o, vg_err *e)
 {
-    if (n < 2) return vg_fail(e, VG_EINPUT, "a signal needs at least 2 frames, and there %s %zu", n == 1 ? "is" : "are", n);
+    if (n < 2) return vg_fail(e, VG_EINPUT, "a signal needs at least 2 frames, but there %s %zu", n == 1 ? "is" : "are", n);
     if (n > VG_SIGNAL_FRAMES)
         return vg_fail(e, VG_EINPUT, "%zu frames are more than a signal shows at once (%d): take fewer with vg-encode "
                        "--take, or pieces of the sequence one by one", n, VG_SIGNAL_FRAMES);
     if (!body->mesh.nv) return vg_fail(e, VG_EINPUT, "the mesh has no vertices");
     if (o->space > VG_SPACE_VERTICES && (!o->graph || o->nexamples || o->space > VG_SPACE_LENGTHS))
-        return vg_fail(e, VG_EARG, "another space than vertices needs a graph, and goes without examples");
+        return vg_fail(e, VG_EARG, "a space other than vertices needs a graph and excludes examples");
     if (o->nexamples == 1) return vg_fail(e, VG_EINPUT, "one example is not enough: there must be at least 2");
     for (size_t i = 0; i < o->npins; i++)
         if (o->pins[i].frame >= n)
@@ -315,7 +315,7 @@ int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, co
                   vg_signal_stats *report, vg_err *e)
 {
     fitting f = {.s = s, .o = o, .report = report, .n = n};
-    int r = check(body, n, o, e);
+    int r = check_options(body, n, o, e);
     *report = (vg_signal_stats){0};
     *s = (vg_signal){.space = o->space ? o->space : VG_SPACE_VERTICES, .d = 3 * body->mesh.nv};
     f.limit = INFINITY;

@@ -37,7 +37,7 @@ static void lag_medians(size_t n, const double *square, double *middle, double *
     }
 }
 
-static double refine(double a, double b, double c)
+static double refine_minimum(double a, double b, double c)
 {
     double bend = a - 2 * b + c, off = bend > 0 ? fmin(fmax(0.5 * (a - c) / bend, -0.5), 0.5) : 0;
     return fabs(off) > 0.05 ? off : 0;
@@ -54,7 +54,7 @@ int vgi_period(size_t n, const double *square, double *period, vg_err *e)
         for (size_t lag = 4; lag < n && !*period; lag++)
             if (middle[lag] < 0.05 && middle[lag] <= middle[lag - 1] && middle[lag] <= middle[lag + 1])
                 *period = (double)lag + (lag + 1 < n && isfinite(middle[lag - 1])
-                                             ? refine(middle[lag - 1], middle[lag], middle[lag + 1]) : 0);
+                                             ? refine_minimum(middle[lag - 1], middle[lag], middle[lag + 1]) : 0);
     }
     int r = room && middle ? VG_OK : VG_ENOMEM;
     free(room);
@@ -203,7 +203,7 @@ typedef struct judge {
     vgi_curve curve;
 } judge;
 
-static int prepare(judge *j, vg_err *e)
+static int prepare_judge(judge *j, vg_err *e)
 {
     size_t n = j->n, m = j->m;
     double *t = vgi_array(n, sizeof *t, e);
@@ -226,27 +226,27 @@ out:
     return r;
 }
 
-static double between(size_t index) /* times i + 1/4, 1/2, 3/4 */
+static double time_between(size_t index) /* times i + 1/4, 1/2, 3/4 */
 {
     const size_t whole = index / 3;
     return 1 + (double)whole + 0.25 * (double)(1 + index % 3);
 }
 
 /* Squared deviation at each intermediate time. Returns the mean square for straight lines. */
-static double measure(judge *j, double *square)
+static double measure_deviation(judge *j, double *square)
 {
     size_t n = j->n, m = j->m, l = j->plate.apart, times = 3 * (n - 1);
     double straight = 0;
     for (size_t i = 0; i < times; i++) {
         double p[2];
-        vgi_curve_at(&j->curve, between(i), p);
+        vgi_curve_at(&j->curve, time_between(i), p);
         vgi_plate_functions(&j->plate, l, p, j->functions + i * l);
     }
     vgi_product_double(times, m, l, j->functions, l, j->coefficients, m, j->fitted, m);
     for (size_t i = 0; i < times; i++) {
         const double *a = j->x + i / 3 * m, *b = a + m;
         double share = 0.25 * (double)(1 + i % 3);
-        vgi_natural_at(n, m, j->x, j->second, between(i), j->row);
+        vgi_natural_at(n, m, j->x, j->second, time_between(i), j->row);
         square[i] = 0;
         for (size_t c = 0; c < m; c++) {
             double line = a[c] * (1 - share) + b[c] * share - j->row[c], off = j->fitted[i * m + c] - j->row[c];
@@ -264,8 +264,8 @@ int vgi_layout_judge(size_t n, size_t m, const double *x, const double *p, doubl
     double *square = vgi_array(times, sizeof *square, e), sum = 0, straight = 0;
     *ratio = 0;
     int r = square ? VG_OK : VG_ENOMEM;
-    if (r == VG_OK && m && n > 2 && (r = prepare(&j, e)) == VG_OK) {
-        straight = measure(&j, square);
+    if (r == VG_OK && m && n > 2 && (r = prepare_judge(&j, e)) == VG_OK) {
+        straight = measure_deviation(&j, square);
         for (size_t i = 0; i < times; i++) sum += square[i] / (double)times;
         if (straight > 0) *ratio = sqrt(sum / straight);
     }
@@ -343,7 +343,7 @@ int vgi_layout_choose(size_t n, size_t m, const double *x, const vg_pin *pins, s
     vgi_distances(n, m, x, m, c.square);
     int r = vgi_period(n, c.square, &c.period, e);
     if (r == VG_OK && only && only->layout == VG_LAYOUT_RING && !(c.period > 0))
-        r = vg_fail(e, VG_EINPUT, "no cycle is found in these frames, so that there is no ring to lay them on");
+        r = vg_fail(e, VG_EINPUT, "no cycle was found in these frames, so a ring layout is impossible");
     size_t count = list_candidates(tried, c.period, only), found = SIZE_MAX, done = 0, wave = (size_t)threads;
     if (r == VG_OK && !(c.p = vgi_array(2 * n * count, sizeof *c.p, e))) r = VG_ENOMEM;
     vgi_blas_alone();
@@ -371,7 +371,7 @@ int vgi_layout_choose(size_t n, size_t m, const double *x, const vg_pin *pins, s
 
 /* ---- crossings ---- */
 
-static bool cross(const double *a, const double *b, double *s, double *t)
+static bool cross_segments(const double *a, const double *b, double *s, double *t)
 {
     double u[2] = {a[2] - a[0], a[3] - a[1]}, v[2] = {b[2] - b[0], b[3] - b[1]}, w[2] = {b[0] - a[0], b[1] - a[1]};
     double det = u[0] * v[1] - u[1] * v[0];
@@ -389,7 +389,7 @@ int vgi_crossings(size_t n, const double *p, vgi_crossing **list, size_t *count,
     *count = 0;
     for (size_t i = 0; i + 3 < n; i++)
         for (size_t j = i + 2; j + 1 < n; j++) {
-            if (!cross(p + 2 * i, p + 2 * j, &s, &t)) continue;
+            if (!cross_segments(p + 2 * i, p + 2 * j, &s, &t)) continue;
             if (vgi_grow(list, &cap, *count + 1, sizeof **list, e) < 0) {
                 free(*list);
                 *list = NULL;

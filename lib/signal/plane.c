@@ -37,7 +37,7 @@ typedef struct plane {
 } plane;
 
 /* The stress at p (x then y), and the result of a step. */
-static double step(const plane *s, const double *p, double *to)
+static double guttman_step(const plane *s, const double *p, double *to)
 {
     size_t n = s->n;
     double stress = 0, sum[2] = {0, 0};
@@ -64,35 +64,35 @@ static double step(const plane *s, const double *p, double *to)
     return stress;
 }
 
-static void swap(double **a, double **b)
+static void swap_arrays(double **a, double **b)
 {
     double *t = *a;
     *a = *b, *b = t;
 }
 
 /* now: current positions; leads: result of a step from there. The result is in now. */
-static vgi_stress_stats settle(const plane *s, double *room[4])
+static vgi_stress_stats settle_plane(const plane *s, double *room[4])
 {
     enum { MOST_STEPS = 2000 };
     double **now = &room[0], **leads = &room[1], **far = &room[2], **beyond = &room[3];
-    double stress = step(s, *now, *leads);
+    double stress = guttman_step(s, *now, *leads);
     size_t steps = 1;
     for (; steps < MOST_STEPS; steps++) {
         for (size_t i = 0; i < 2 * s->n; i++) (*far)[i] = 2 * (*leads)[i] - (*now)[i];
-        double next = step(s, *far, *beyond);
+        double next = guttman_step(s, *far, *beyond);
         if (next < stress) {
-            swap(now, far);
-            swap(leads, beyond);
+            swap_arrays(now, far);
+            swap_arrays(leads, beyond);
         } else {
-            swap(now, leads);
-            next = step(s, *now, *leads);
+            swap_arrays(now, leads);
+            next = guttman_step(s, *now, *leads);
         }
         double less = stress - next;
         stress = next;
         if (!(less > 1e-7 * stress)) break;
     }
-    swap(now, leads); /* the last one is a plain step */
-    return (vgi_stress_stats){.stress = step(s, *now, *leads), .steps = steps};
+    swap_arrays(now, leads); /* the last one is a plain step */
+    return (vgi_stress_stats){.stress = guttman_step(s, *now, *leads), .steps = steps};
 }
 
 int vgi_plane_settle(size_t n, const double *distance, const bool *held, double *p, vgi_stress_stats *stats, vg_err *e)
@@ -106,7 +106,7 @@ int vgi_plane_settle(size_t n, const double *distance, const bool *held, double 
     double *room[4] = {all, all + 2 * n, all + 4 * n, all + 6 * n};
     for (size_t i = 0; i < n; i++) room[0][i] = p[2 * i], room[0][n + i] = p[2 * i + 1];
     vgi_stress_stats f = {0};
-    if (s.nheld < n) f = settle(&s, room);
+    if (s.nheld < n) f = settle_plane(&s, room);
     for (size_t i = 0; i < n; i++) p[2 * i] = room[0][i], p[2 * i + 1] = room[0][n + i];
     if (stats) *stats = f;
     free(all);

@@ -78,7 +78,7 @@ typedef struct looking {
 } looking;
 
 /* three rows of a region's matrix: x, y and z of its vertices in a frame, relative to the origin */
-static void gather(const vgi_region *p, const double *vertices, const double origin[3], double *rows)
+static void gather_rows(const vgi_region *p, const double *vertices, const double origin[3], double *rows)
 {
     for (size_t i = 0; i < p->n; i++)
         for (size_t k = 0; k < 3; k++) rows[k * p->n + i] = vertices[3 * p->vertex[i] + k] - origin[k];
@@ -90,7 +90,7 @@ static void look_at_region(void *context, size_t i)
     const vgi_region *p = &l->r->region[i];
     double rows[3 * VGI_REGION], *sum = l->r->matrices + l->r->matrix[i];
     for (size_t f = 0; f < l->n; f++) {
-        gather(p, l->vertices[f], l->origin[f], rows);
+        gather_rows(p, l->vertices[f], l->origin[f], rows);
         vgi_gemm_double(true, false, p->n, p->n, 3, rows, p->n, rows, p->n, 1, sum, p->n);
     }
 }
@@ -136,7 +136,7 @@ static double shrink(double square, double shape)
 }
 
 /* the filter: sum of factor v v' over the eigenvectors v */
-static void compose(size_t n, double *vectors, double *values, size_t rows, double variance, double *filter,
+static void compose_filter(size_t n, double *vectors, double *values, size_t rows, double variance, double *filter,
                     double *scaled)
 {
     for (size_t i = 0; i < n; i++) {
@@ -165,7 +165,7 @@ static int learn_region(vg_region_filter *x, size_t i, double *values, double *v
     if (r < 0) return r;
     double variance = find_noise(rows, n, values);
     x->noise[i] = sqrt(variance);
-    compose(n, vectors, values, rows, variance, filter, scaled);
+    compose_filter(n, vectors, values, rows, variance, filter, scaled);
     return VG_OK;
 }
 
@@ -207,7 +207,7 @@ static void add_region(const vg_region_filter *x, size_t i, const double *in, co
 {
     const vgi_region *p = &x->region[i];
     double rows[3 * VGI_REGION], kept[3 * VGI_REGION];
-    gather(p, in, origin, rows);
+    gather_rows(p, in, origin, rows);
     vgi_product_double(3, p->n, p->n, rows, p->n, x->matrices + x->matrix[i], p->n, kept, p->n);
     for (size_t k = 0; k < p->n; k++)
         for (size_t c = 0; c < 3; c++) sum[3 * p->vertex[k] + c] += weight_of(p, k) * kept[c * p->n + k];

@@ -16,7 +16,7 @@ typedef struct growth {
     size_t nfront;
 } growth;
 
-static void clear(growth *g)
+static void clear_growth(growth *g)
 {
     free(g->first);
     free(g->next);
@@ -42,7 +42,7 @@ static void gather_neighbours(growth *g)
     }
 }
 
-static int prepare(growth *g, vg_err *e)
+static int prepare_growth(growth *g, vg_err *e)
 {
     const vg_mesh *m = g->m;
     size_t corners = vg_mesh_corners(m);
@@ -86,7 +86,7 @@ static uint32_t take_nearest(growth *g)
     return v;
 }
 
-static void grow(growth *g, uint32_t centre, vgi_region *region)
+static void grow_region(growth *g, uint32_t centre, vgi_region *region)
 {
     region->n = 0;
     g->nfront = 0;
@@ -109,12 +109,12 @@ int vgi_regions_grow(const vg_mesh *m, const double *points, vgi_region **region
     size_t cap = 0;
     *regions = NULL;
     *n = 0;
-    int r = prepare(&g, e);
+    int r = prepare_growth(&g, e);
     for (uint32_t v = 0; v < m->nv && r == VG_OK; v++) {
         if (g.covered[v]) continue;
-        if ((r = vgi_grow(regions, &cap, *n + 1, sizeof **regions, e)) == VG_OK) grow(&g, v, &(*regions)[(*n)++]);
+        if ((r = vgi_grow(regions, &cap, *n + 1, sizeof **regions, e)) == VG_OK) grow_region(&g, v, &(*regions)[(*n)++]);
     }
-    clear(&g);
+    clear_growth(&g);
     if (r < 0) {
         free(*regions);
         *regions = NULL;

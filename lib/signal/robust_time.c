@@ -69,7 +69,7 @@ static void weigh_again(track *t, bool bisquare)
 }
 
 /* Least squares, then least absolute distances, then bisquare weights. Stops early when the residual is zero. */
-static void follow(track *t)
+static void fit_track(track *t)
 {
     for (size_t j = 0; j < t->n; j++) t->weight[j] = 1;
     memset(t->coefficient, 0, sizeof t->coefficient);
@@ -93,7 +93,7 @@ void vgi_robust_points(size_t npoints, size_t width, size_t n, const double *con
     for (size_t p = 0; p < npoints; p++) {
         for (size_t j = 0; j < n; j++) place[j] = frame[j] + width * p;
         if (n < 5) memcpy(t.coefficient[0], place[at], width * sizeof(double));
-        else follow(&t);
+        else fit_track(&t);
         memcpy(out + width * p, t.coefficient[0], width * sizeof(double));
     }
 }

@@ -4,7 +4,7 @@
 #include "numeric/polar.h"
 #include "numeric/vec3.h"
 
-static void find(size_t nv, const double *reference, const double from[3], const double *pose, double turn[4],
+static void find_root(size_t nv, const double *reference, const double from[3], const double *pose, double turn[4],
                  double shift[3])
 {
     double to[3], b[9] = {0}, moved[3];
@@ -25,7 +25,7 @@ void vgi_root_remove(size_t n, size_t nv, const double *reference, double *poses
     vg_centroid(reference, nv, from);
     for (size_t i = 0; i < n; i++) {
         double *q = turn + 4 * i, *t = shift + 3 * i, *pose = poses + i * 3 * nv, m[9], same = 0;
-        find(nv, reference, from, pose, q, t);
+        find_root(nv, reference, from, pose, q, t);
         for (int k = 0; k < 4 && i; k++) same += q[k] * (q - 4)[k];
         for (int k = 0; k < 4 && same < 0; k++) q[k] = -q[k];
         vg_quat_matrix((double[]){q[0], -q[1], -q[2], -q[3]}, m);

@@ -35,7 +35,7 @@ int vg_signal_sketch(const double *points, size_t n, bool controls, size_t frame
     vgi_curve c = {0};
     size_t least = controls ? 4 : 2;
     if (n < least)
-        return vg_fail(e, VG_EINPUT, "a curve takes at least %zu %s, and there %s %zu", least,
+        return vg_fail(e, VG_EINPUT, "a curve needs at least %zu %s, but there %s %zu", least,
                        controls ? "control points" : "points", n == 1 ? "is" : "are", n);
     int r = controls ? from_controls(&c, points, n, e) : through_points(&c, points, n, e);
     for (size_t i = 0; r == VG_OK && i < frames; i++) {

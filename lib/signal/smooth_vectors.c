@@ -92,7 +92,7 @@ static void find_turn(const vg_vector_smoother *s, const double *vectors, const 
 
 typedef struct parting {
     const vg_vector_smoother *s;
-    const double *before;  /* quaternions of the frame before; NULL: there is none */
+    const double *before;  /* quaternions of the previous frame, or NULL */
     const double *turn;
     double *scales, *pose; /* out */
 } parting;

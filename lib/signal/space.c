@@ -65,7 +65,7 @@ int vgi_space_make(vgi_space *s, vg_space kind, const vg_graph *g, const double 
     *s = (vgi_space){.kind = kind, .g = g};
     size_t corners = vg_graph_corners(g);
     int r = g->faces.nf ? vgi_pieces_make(&s->pieces, g, reference, e)
-                  : vg_fail(e, VG_EINPUT, "the mesh has no faces: only vertices are a space of shapes then");
+                  : vg_fail(e, VG_EINPUT, "the mesh has no faces: its shape space can only be vertices");
     if (r < 0) return r;
     s->nodes = kind == VG_SPACE_VECTORS ? g->faces.nf : s->pieces.n;
     s->d = kind == VG_SPACE_VECTORS ? OF_CORNER * corners : OF_PIECE * s->pieces.n;
@@ -128,7 +128,7 @@ static void make_unit(const double from[4], double q[4])
 }
 
 /* Rotation and stretch of a piece without a map: those of a corner. */
-static void borrow(const double corner[4], double q[4], double stretch[9])
+static void borrow_map(const double corner[4], double q[4], double stretch[9])
 {
     double scale = corner[0] * corner[0] + corner[1] * corner[1] + corner[2] * corner[2] + corner[3] * corner[3];
     make_unit(corner, q);
@@ -144,7 +144,7 @@ static void measure_gradient(const vgi_space *s, size_t i, const double *pose, c
     bool any = false;
     for (int k = 0; k < 9; k++) any = any || inverse[k] != 0;
     if (!any) {
-        borrow(corner, q, stretch);
+        borrow_map(corner, q, stretch);
         return;
     }
     vgi_piece_edges(&s->pieces, i, pose, first, second);
@@ -164,7 +164,7 @@ static void measure_frame(const vgi_space *s, size_t i, const double *pose, cons
     double stretch[9];
     vgi_piece_edges(&s->pieces, i, pose, edge, edge + 3);
     if (!vgi_is_triangle(&s->pieces, i) || !vgi_triangle_axes(edge, now) || !vgi_triangle_axes(s->edges + 6 * i, before)) {
-        borrow(corner, q, stretch);
+        borrow_map(corner, q, stretch);
         return;
     }
     for (size_t k = 0; k < 9; k++) inverse[k] = before[3 * (k % 3) + k / 3];
@@ -309,7 +309,7 @@ static void keep_logs(walking *w, size_t f, const double *now)
 }
 
 /* Pass the logarithms of each frame to `take`, frame by frame. */
-static int walk(walking *w, void (*take)(walking *w, size_t f, const double *now), vg_err *e)
+static int walk_frames(walking *w, void (*take)(walking *w, size_t f, const double *now), vg_err *e)
 {
     const vgi_space *s = w->s;
     vgi_branches branches;
@@ -330,10 +330,10 @@ static int put_turns(const vgi_space *s, size_t n, double *turns, double *values
                  .cost = vgi_array(s->pieces.npairs, sizeof(double), e), .l = vgi_array(2 * s->nodes, 3 * sizeof(double), e),
                  .exact = vgi_array(s->nodes, 3 * sizeof(double), e), .sum = vgi_array(s->nodes, 3 * sizeof(double), e),
                  .home = home, .values = values, .jumps = jumps};
-    int r = w.pair && w.cost && w.l && w.exact && w.sum ? walk(&w, add_logs, e) : VG_ENOMEM;
+    int r = w.pair && w.cost && w.l && w.exact && w.sum ? walk_frames(&w, add_logs, e) : VG_ENOMEM;
     if (r == VG_OK) {
         move_homes(s, n, w.sum, turns, home);
-        r = walk(&w, keep_logs, e);
+        r = walk_frames(&w, keep_logs, e);
     }
     free(w.pair);
     free(w.cost);

@@ -96,7 +96,7 @@ static double angle_of(const vgi_space *s, size_t i, const double *vertices)
     return atan2(vgi_dot(sine, axis) / length, vgi_dot(na, nb));
 }
 
-static double distance(const double *vertices, const uint32_t *edge)
+static double edge_length(const double *vertices, const uint32_t *edge)
 {
     return sqrt(vgi_square(vertices + 3 * (size_t)edge[0], vertices + 3 * (size_t)edge[1]));
 }
@@ -105,7 +105,7 @@ void vgi_relative_lengths(const vgi_space *s, const double *pose, double *values
 {
     const vgi_relative *w = s->relative;
     for (size_t i = 0; i < w->nedges; i++)
-        values[i] = (distance(pose, w->edge + 2 * i) - w->length[i]) * w->edge_weight[i];
+        values[i] = (edge_length(pose, w->edge + 2 * i) - w->length[i]) * w->edge_weight[i];
     for (size_t i = 0; i < s->pieces.npairs; i++)
         if (is_hinge(s, i)) values[w->at[i]] = angle_of(s, i, pose) - w->angle[i];
 }
@@ -137,7 +137,7 @@ static int make_edges(const vgi_space *s, const double *reference, vg_err *e)
                (w->axes = vgi_array(p->n, 9 * sizeof(double), e)) ? VG_OK : VG_ENOMEM;
     if (r == VG_OK) number_edges(p, w, sides, vgi_pieces_sides(p, sides));
     for (size_t i = 0; r == VG_OK && i < w->nedges; i++) {
-        w->length[i] = distance(reference, w->edge + 2 * i);
+        w->length[i] = edge_length(reference, w->edge + 2 * i);
         w->edge_weight[i] = sqrt(w->edge_weight[i]) / fmax(w->length[i], least > 0 ? least : 1);
     }
     for (size_t i = 0; r == VG_OK && i < p->n; i++)
@@ -364,7 +364,7 @@ static void find_rest(const vgi_space *s)
     }
 }
 
-static int factorize(const vgi_space *s, vg_err *e)
+static int factorize_frames(const vgi_space *s, vg_err *e)
 {
     vgi_relative *w = s->relative;
     vgi_sparse a = {0};
@@ -381,7 +381,7 @@ static int factorize(const vgi_space *s, vg_err *e)
 }
 
 /* Solve, with one step of iterative refinement. */
-static int solve(const vgi_space *s, vg_err *e)
+static int solve_frames(const vgi_space *s, vg_err *e)
 {
     vgi_relative *w = s->relative;
     size_t n = 9 * (s->pieces.n - 1);
@@ -425,7 +425,7 @@ int vgi_relative_edges(vgi_space *s, const double *values, vg_err *e)
     int r = VG_OK;
     if (s->kind == VG_SPACE_LENGTHS) lay_pieces(s, values);
     find_turns(s, values);
-    if (s->pieces.n > 1 && ((r = factorize(s, e)) < 0 || (r = solve(s, e)) < 0)) return r;
+    if (s->pieces.n > 1 && ((r = factorize_frames(s, e)) < 0 || (r = solve_frames(s, e)) < 0)) return r;
     turn_whole(s, values, whole);
     for (size_t i = 0; i < s->pieces.n; i++) {
         double m[9], stretch[9], *edges = s->moved + 6 * i;

@@ -23,7 +23,7 @@ void vgi_span_clear(vgi_span *s)
 
 /* ---- orthonormal vectors from examples ---- */
 
-static void subtract(size_t n, size_t d, const double *from, double *rows)
+static void subtract_first(size_t n, size_t d, const double *from, double *rows)
 {
     for (size_t i = 0; i < n; i++)
         for (size_t c = 0; c < d; c++) rows[i * d + c] -= from[c];
@@ -37,24 +37,24 @@ static int take_differences(vgi_span *s, const double *examples, int threads, vg
         !(s->difference = vgi_copy_array(examples + d, m * d, sizeof *s->difference, e)) ||
         !(s->factor = vgi_array(m * m, sizeof *s->factor, e)) || !(s->offset = vgi_array(m, sizeof *s->offset, e)))
         return VG_ENOMEM;
-    subtract(m, d, s->home, s->difference);
+    subtract_first(m, d, s->home, s->difference);
     vgi_gram(m, d, s->difference, s->factor, threads);
     for (size_t j = 0; j < m; j++) most = fmax(most, s->factor[j * m + j]);
     bool definite = vgi_spd_factor(m, s->factor);
     for (size_t j = 0; j < m && definite; j++) definite = s->factor[j * m + j] * s->factor[j * m + j] > 1e-10 * most;
     return definite ? VG_OK
-                    : vg_fail(e, VG_EINPUT, "the examples are not independent: one of them is the first one, or follows from "
-                              "the others");
+                    : vg_fail(e, VG_EINPUT, "the examples are not independent: one of them is the first one, or is a "
+                                            "combination of the others");
 }
 
 /* Coordinates of the frames in the orthonormal vectors, and their mean. */
-static void measure(vgi_span *s, vgi_basis *b)
+static void measure_coordinates(vgi_span *s, vgi_basis *b)
 {
     size_t n = b->n, m = s->m;
     vgi_product_double_transposed(n, m, s->d, b->centred, s->d, b->vectors, s->d, b->x, m);
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < m; j++) s->offset[j] += b->x[i * m + j] / (double)n;
-    subtract(n, m, s->offset, b->x);
+    subtract_first(n, m, s->offset, b->x);
 }
 
 static void move_mean(const vgi_span *s, vgi_basis *b)
@@ -63,7 +63,7 @@ static void move_mean(const vgi_span *s, vgi_basis *b)
     memset(b->mean, 0, d * sizeof *b->mean);
     for (size_t j = 0; j < s->m; j++)
         for (size_t c = 0; c < d; c++) b->mean[c] += s->offset[j] * b->vectors[j * d + c];
-    subtract(b->n, d, b->mean, b->centred);
+    subtract_first(b->n, d, b->mean, b->centred);
     for (size_t c = 0; c < d; c++) b->mean[c] += s->home[c];
 }
 
@@ -83,8 +83,8 @@ int vgi_span_make(vgi_span *s, vgi_basis *b, double *poses, size_t n, size_t d, 
     }
     if (r == VG_OK) {
         vgi_solve_lower_stripe(s->m, s->factor, d, b->vectors, d);
-        subtract(n, d, s->home, b->centred);
-        measure(s, b);
+        subtract_first(n, d, s->home, b->centred);
+        measure_coordinates(s, b);
         move_mean(s, b);
     } else {
         vgi_basis_clear(b);
@@ -148,9 +148,10 @@ int vg_signal_onto(vg_signal *s, const vg_body *from, const vg_body *to, double 
 {
     size_t d = 3 * to->mesh.nv;
     int r = VG_EINPUT;
-    if (!s->examples) vg_fail(e, r, "the signal's shapes are no sums of examples: fit it with vg-fitsignal --examples");
+    if (!s->examples) vg_fail(e, r, "the signal's shapes are not sums of examples: fit it with vg-fitsignal "
+                                    "--examples");
     else if (n != s->m + 1)
-        vg_fail(e, r, "there are %zu poses, and the signal has %zu examples: they must be the same ones", n, s->m + 1);
+        vg_fail(e, r, "there are %zu poses, but the signal has %zu examples: they must match", n, s->m + 1);
     else r = VG_OK;
     if (r == VG_OK && s->nturns) turn_back(s, to->reference, poses, n, to->mesh.nv);
     double *mean = r == VG_OK ? vgi_copy_array(poses, d, sizeof *mean, e) : NULL;
@@ -160,7 +161,7 @@ int vg_signal_onto(vg_signal *s, const vg_body *from, const vg_body *to, double 
         return r;
     }
     if (s->rooted) move_root(s, from->reference, from->mesh.nv, to->reference, to->mesh.nv);
-    subtract(n - 1, d, mean, poses + d);
+    subtract_first(n - 1, d, mean, poses + d);
     memmove(poses, poses + d, (n - 1) * d * sizeof *poses);
     free(s->mean);
     free(s->basis);

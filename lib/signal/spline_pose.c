@@ -50,7 +50,7 @@ static double *rows_of_lines(size_t rows, size_t stride, double **room, vg_err *
     return *room + (LINE - (uintptr_t)*room / sizeof **room % LINE) % LINE;
 }
 
-static int start(vgi_plate *s, size_t n, size_t most, const double *p, vg_err *e)
+static int start_plate(vgi_plate *s, size_t n, size_t most, const double *p, vg_err *e)
 {
     *s = (vgi_plate){.n = n, .most = most, .stride = (n + LINE - 1) / LINE * LINE};
     if (!(s->p = vgi_array(n, 2 * sizeof *s->p, e)) || !(s->site = vgi_array(most, sizeof *s->site, e)) ||
@@ -201,7 +201,7 @@ static bool is_anchor(const vgi_plate *s, size_t site)
 
 int vgi_plate_make(vgi_plate *s, size_t n, const double *p, const uint32_t *sites, size_t l, vg_err *e)
 {
-    if (start(s, n, l < 3 ? 3 : l, p, e) < 0) {
+    if (start_plate(s, n, l < 3 ? 3 : l, p, e) < 0) {
         vgi_plate_clear(s);
         return VG_ENOMEM;
     }
@@ -341,7 +341,7 @@ static void add_others(greedy *g, vgi_site_rule rule, double apart)
     }
 }
 
-static int run(greedy *g, vgi_site_rule rule, vg_err *e)
+static int run_greedy(greedy *g, vgi_site_rule rule, vg_err *e)
 {
     vgi_plate *s = g->s;
     size_t anchors = s->l;
@@ -388,14 +388,14 @@ int vgi_plate_order(vgi_plate *s, size_t n, size_t m, const double *p, const dou
                     vgi_site_rule rule, vg_err *e)
 {
     greedy g = {.s = s, .m = m};
-    int r = start(s, n, n < 3 ? 3 : n, p, e);
+    int r = start_plate(s, n, n < 3 ? 3 : n, p, e);
     uint32_t *all = vgi_array(n, sizeof *all, e);
     if (r == VG_OK) r = all ? start_greedy(&g, x, stride, e) : VG_ENOMEM;
     if (r == VG_OK) {
         for (size_t i = 0; i < n; i++) all[i] = (uint32_t)i;
         choose_anchors(s, all, n);
         add_anchors(s);
-        r = run(&g, rule, e);
+        r = run_greedy(&g, rule, e);
     }
     free(all);
     end_greedy(&g);

@@ -25,14 +25,14 @@ void vgi_parameters(size_t n, const double *p, double *t)
     for (size_t i = 1; i < n; i++) t[i] = t[i - 1] + fmax(t[i], 1e-3 * mean);
 }
 
-static double place(const double *x, size_t i)
+static double place_of(const double *x, size_t i)
 {
     return x ? x[i] : (double)i + 1;
 }
 
 static double secant(const double *x, const double *y, size_t i)
 {
-    return (y[i + 1] - y[i]) / (place(x, i + 1) - place(x, i));
+    return (y[i + 1] - y[i]) / (place_of(x, i + 1) - place_of(x, i));
 }
 
 /* Slope at an end, from the parabola through it and the next two points: h, d of the step there, g, c of the next. */
@@ -60,7 +60,7 @@ void vgi_monotone_slopes(size_t n, const double *x, const double *y, double *slo
     }
     for (size_t i = 0; i < n; i++) {
         size_t j = i == 0 ? 0 : i + 1 < n ? i - 1 : n - 3;
-        double h = place(x, j + 1) - place(x, j), g = place(x, j + 2) - place(x, j + 1);
+        double h = place_of(x, j + 1) - place_of(x, j), g = place_of(x, j + 2) - place_of(x, j + 1);
         double d = secant(x, y, j), c = secant(x, y, j + 1);
         slope[i] = i == 0 ? end_slope(h, d, g, c) : i + 1 < n ? (g * d + h * c) / (h + g) : end_slope(g, c, h, d);
         slope[i] = fmax(slope[i], 0);
@@ -72,8 +72,8 @@ void vgi_monotone_slopes(size_t n, const double *x, const double *y, double *slo
 
 double vgi_monotone_at(size_t n, const double *x, const double *y, const double *slope, double at)
 {
-    if (!(at > place(x, 0))) return y[0];
-    if (!(at < place(x, n - 1))) return y[n - 1];
+    if (!(at > place_of(x, 0))) return y[0];
+    if (!(at < place_of(x, n - 1))) return y[n - 1];
     size_t low = 0, high = n - 1;
     if (!x) low = (size_t)at - 1, high = low + 1;
     while (high - low > 1) {
@@ -81,7 +81,7 @@ double vgi_monotone_at(size_t n, const double *x, const double *y, const double 
         if (at < x[middle]) high = middle;
         else low = middle;
     }
-    double width = place(x, high) - place(x, low), h = (at - place(x, low)) / width, g = 1 - h;
+    double width = place_of(x, high) - place_of(x, low), h = (at - place_of(x, low)) / width, g = 1 - h;
     if (h == 0) return y[low];
     return y[low] * (1 + 2 * h) * g * g + width * slope[low] * h * g * g + y[high] * h * h * (3 - 2 * h) -
            width * slope[high] * h * h * g;

@@ -56,7 +56,7 @@ static double length_of(size_t m, const double *products, const double *x)
     return sqrt(fmax(sum, 0));
 }
 
-static int measure(vg_trace *t, const vg_signal *s, vg_sampler *p, vg_err *e)
+static int measure_trace(vg_trace *t, const vg_signal *s, vg_sampler *p, vg_err *e)
 {
     size_t n = s->n, m = s->m;
     double *products = NULL, *second = vgi_array(n * m, sizeof *second, e), *room = vgi_array(n + 2 * m, sizeof *room, e);
@@ -85,7 +85,7 @@ int vg_signal_trace(vg_trace *t, const vg_signal *s, size_t parts, vg_err *e)
     if (r == VG_OK && (!(t->position = vgi_array(t->n, 2 * sizeof *t->position, e)) ||
                        !(t->deviation = vgi_array(t->n, sizeof *t->deviation, e))))
         r = VG_ENOMEM;
-    if (r == VG_OK) r = measure(t, s, p, e);
+    if (r == VG_OK) r = measure_trace(t, s, p, e);
     if (r == VG_OK) r = vgi_signal_curve(s, &curve, e);
     if (r == VG_OK) r = vgi_curve_crossings(&curve, parts, &t->crossing, &t->ncrossings, e);
     vgi_curve_clear(&curve);

@@ -107,7 +107,7 @@ int vgi_unshape_make(vgi_unshape *u, vg_space kind, const vg_graph *g, const dou
 }
 
 /* The vertices of a batch of shapes (u->shape). */
-static int solve(vgi_unshape *u, size_t n, vg_err *e)
+static int solve_shapes(vgi_unshape *u, size_t n, vg_err *e)
 {
     const vg_graph *g = u->space.g;
     size_t corners = vg_graph_corners(g);
@@ -125,7 +125,7 @@ static int solve(vgi_unshape *u, size_t n, vg_err *e)
     return VG_OK;
 }
 
-static void measure(vgi_unshape *u, size_t frame, const double *x)
+static void measure_frame(vgi_unshape *u, size_t frame, const double *x)
 {
     const vg_graph *g = u->space.g;
     const double *pose = u->poses + 3 * frame * g->faces.nv;
@@ -158,9 +158,9 @@ int vgi_unshape_error(vgi_unshape *u, const vgi_basis *b, const double *x, size_
         vgi_blas_shared();
         for (size_t i = 0; i < some; i++)
             for (size_t c = 0; c < d; c++) u->shape[i * d + c] += b->mean[c];
-        int r = solve(u, some, e);
+        int r = solve_shapes(u, some, e);
         if (r < 0) return r;
-        for (size_t i = 0; i < some; i++) measure(u, first + i, u->x + 3 * i * u->space.g->faces.nv);
+        for (size_t i = 0; i < some; i++) measure_frame(u, first + i, u->x + 3 * i * u->space.g->faces.nv);
     }
     for (size_t i = 0; i < n; i++) sum += u->squares[i]; /* in the order of frames: batches depend on the threads */
     error->most = sqrt(u->most);

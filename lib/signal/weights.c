@@ -47,7 +47,7 @@ int vgi_time_filter_make(vgi_time_filter *t, vg_filter filter, double span, vg_e
     if (span == 0) return VG_OK;
     double most = filter == VG_ROBUST ? (VGI_MOST_ROBUST - 1) / 2 : 1000;
     if (!(span > 1 && span <= most))
-        return vg_fail(e, VG_EARG, "this filter in time spans more than 1 frame and at most %g, not %g", most, span);
+        return vg_fail(e, VG_EARG, "the span of this filter must be above 1 frame and at most %g, not %g", most, span);
     if (filter == VG_LOWPASS) return make_lowpass(t, e);
     t->reach = (size_t)fmax(lround(span), 2);
     return VG_OK;

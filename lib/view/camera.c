@@ -28,7 +28,7 @@ vgi_box vgi_box_empty(void)
     return (vgi_box){{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
 }
 
-static double along(const float axis[3], const float p[3])
+static double along_axis(const float axis[3], const float p[3])
 {
     return (double)axis[0] * p[0] + (double)axis[1] * p[1] + (double)axis[2] * p[2];
 }
@@ -38,7 +38,7 @@ void vgi_camera_measure(const vgi_camera *c, const vgi_figure *g, const float *p
 {
     for (size_t v = 0; v < g->mesh->nv; v++) {
         if (!g->drawn[v]) continue;
-        double seen[2] = {along(c->right, points + 3 * v) - shift[0], along(c->up, points + 3 * v) - shift[1]};
+        double seen[2] = {along_axis(c->right, points + 3 * v) - shift[0], along_axis(c->up, points + 3 * v) - shift[1]};
         for (int k = 0; k < 2; k++) {
             if (seen[k] < box->least[k]) box->least[k] = seen[k];
             if (seen[k] > box->most[k]) box->most[k] = seen[k];
@@ -64,8 +64,8 @@ void vgi_camera_project(const vgi_camera *c, const float *points, size_t nv, flo
 {
     for (size_t v = 0; v < nv; v++) {
         const float *p = points + 3 * v;
-        seen[3 * v] = (float)((along(c->right, p) - c->x) * c->scale + c->width / 2);
-        seen[3 * v + 1] = (float)(c->height / 2 - (along(c->up, p) - c->y) * c->scale);
-        seen[3 * v + 2] = (float)(along(c->toward, p) * c->scale);
+        seen[3 * v] = (float)((along_axis(c->right, p) - c->x) * c->scale + c->width / 2);
+        seen[3 * v + 1] = (float)(c->height / 2 - (along_axis(c->up, p) - c->y) * c->scale);
+        seen[3 * v + 2] = (float)(along_axis(c->toward, p) * c->scale);
     }
 }

@@ -36,7 +36,7 @@ static void from_oklab(double l, double a, double b, float linear[3])
 }
 
 /* A path of n stops, t from 0 to 1. */
-static void follow(const stop *path, size_t n, double t, float linear[3])
+static void follow_path(const stop *path, size_t n, double t, float linear[3])
 {
     double at = t * (double)(n - 1);
     size_t i = at >= (double)(n - 1) ? n - 2 : (size_t)at;
@@ -50,9 +50,9 @@ void vgi_map_colour(double t, bool diverging, float linear[3])
 {
     enum { RISING = sizeof rising / sizeof *rising, HALF = sizeof parting / sizeof *parting / 2 };
     double x = fmin(fmax(t, 0), 1);
-    if (!diverging) follow(rising, RISING, x, linear);
-    else if (x < 0.5) follow(parting, HALF, 2 * x, linear);
-    else follow(parting + HALF, HALF, 2 * x - 1, linear);
+    if (!diverging) follow_path(rising, RISING, x, linear);
+    else if (x < 0.5) follow_path(parting, HALF, 2 * x, linear);
+    else follow_path(parting + HALF, HALF, 2 * x - 1, linear);
 }
 
 float vgi_linear(unsigned char srgb)

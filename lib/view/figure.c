@@ -107,7 +107,7 @@ int vgi_figure_sides(vgi_figure *g, vg_err *e)
 
 /* ---- normals ---- */
 
-static float dot(const float a[3], const float b[3])
+static float dot3(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -136,7 +136,7 @@ static void corner_normal(const vgi_figure *g, size_t f, size_t c, const float *
     uint32_t v = g->mesh->vert[c];
     float *normal = normals + 3 * c;
     const float *own = face + 3 * f;
-    float length = sqrtf(dot(own, own)), sum[3] = {0, 0, 0};
+    float length = sqrtf(dot3(own, own)), sum[3] = {0, 0, 0};
     uint32_t first = g->ring_start[v], end = g->ring_start[v + 1];
     bool all = end - first > MOST_COMPARED;
     if (all && c != g->first[v]) {
@@ -145,10 +145,10 @@ static void corner_normal(const vgi_figure *g, size_t f, size_t c, const float *
     }
     for (uint32_t i = first; i < end; i++) {
         const float *other = face + 3 * (size_t)g->ring[i];
-        if (all || dot(own, other) >= CREASE_COSINE * length * sqrtf(dot(other, other)))
+        if (all || dot3(own, other) >= CREASE_COSINE * length * sqrtf(dot3(other, other)))
             for (int k = 0; k < 3; k++) sum[k] += other[k];
     }
-    float size = sqrtf(dot(sum, sum));
+    float size = sqrtf(dot3(sum, sum));
     for (int k = 0; k < 3; k++) normal[k] = size > 0 ? sum[k] / size : 0;
 }
 
@@ -172,7 +172,7 @@ typedef struct clipping {
     size_t *reflex, nreflex;   /* corners that may lie inside an ear */
 } clipping;
 
-static double turn(const clipping *k, size_t a, size_t b, size_t c)
+static double signed_area(const clipping *k, size_t a, size_t b, size_t c)
 {
     const double *p = k->xy + 2 * a, *q = k->xy + 2 * b, *r = k->xy + 2 * c;
     return k->sign * ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]));
@@ -181,11 +181,11 @@ static double turn(const clipping *k, size_t a, size_t b, size_t c)
 static bool is_ear(const clipping *k, size_t b)
 {
     size_t a = k->before[b], c = k->after[b];
-    if (turn(k, a, b, c) <= 0) return false;
+    if (signed_area(k, a, b, c) <= 0) return false;
     for (size_t i = 0; i < k->nreflex; i++) {
         size_t p = k->reflex[i];
         if (p == a || p == b || p == c) continue;
-        if (turn(k, a, b, p) >= 0 && turn(k, b, c, p) >= 0 && turn(k, c, a, p) >= 0) return false;
+        if (signed_area(k, a, b, p) >= 0 && signed_area(k, b, c, p) >= 0 && signed_area(k, c, a, p) >= 0) return false;
     }
     return true;
 }
@@ -196,7 +196,7 @@ static void drop_convex(clipping *k, size_t gone)
     size_t n = 0;
     for (size_t i = 0; i < k->nreflex; i++) {
         size_t p = k->reflex[i];
-        if (p != gone && turn(k, k->before[p], p, k->after[p]) <= 0) k->reflex[n++] = p;
+        if (p != gone && signed_area(k, k->before[p], p, k->after[p]) <= 0) k->reflex[n++] = p;
     }
     k->nreflex = n;
 }
@@ -209,7 +209,7 @@ void vgi_ear_clip(const double *xy, size_t n, size_t *work, size_t *triangles)
     clipping k = {.xy = xy, .sign = area < 0 ? -1 : 1, .before = work, .after = work + n, .reflex = work + 2 * n};
     for (size_t i = 0; i < n; i++) k.before[i] = (i + n - 1) % n, k.after[i] = (i + 1) % n;
     for (size_t i = 0; i < n; i++)
-        if (turn(&k, k.before[i], i, k.after[i]) <= 0) k.reflex[k.nreflex++] = i;
+        if (signed_area(&k, k.before[i], i, k.after[i]) <= 0) k.reflex[k.nreflex++] = i;
     size_t b = 0;
     for (size_t left = n, t = 0; left > 2; left--, t++) {
         size_t tried = 0;

@@ -10,7 +10,7 @@ enum { SHADOW_SIZE = 128, SHADOW_BLUR = 3 };
 #define SHADOW_DEPTH 0.5f
 #define LINE_DEPTH 0.2f
 
-static double dot(const double a[3], const float b[3])
+static double dot3(const double a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -100,14 +100,14 @@ static double smooth_step(double a, double b, double x)
 
 float vgi_ground_light(const vgi_ground *g, const vgi_camera *c, double x, double y, double pixel)
 {
-    double rise = dot(g->vertical, c->toward), tilt = dot(g->vertical, c->up);
+    double rise = dot3(g->vertical, c->toward), tilt = dot3(g->vertical, c->up);
     if (fabs(rise) < 0.02) /* seen from the side, the ground is a line */
         return fabs(y * tilt - g->height) < pixel / 2 ? 1 - 2 * LINE_DEPTH : 1;
     double z = (g->height - y * tilt) / rise; /* right has no rise */
     double at[2], change[2];
     const double *axes[2] = {g->across, g->along};
     for (int k = 0; k < 2; k++) {
-        double rx = dot(axes[k], c->right), ux = dot(axes[k], c->up), tx = dot(axes[k], c->toward);
+        double rx = dot3(axes[k], c->right), ux = dot3(axes[k], c->up), tx = dot3(axes[k], c->toward);
         at[k] = x * rx + y * ux + z * tx;
         change[k] = hypot(rx, ux - tx * tilt / rise) * pixel;
     }

@@ -11,7 +11,7 @@ static const signed char directions[VGI_HULL / 2][3] = {{1, 0, 0},  {0, 1, 0},  
                                                         {1, 0, 1},  {1, 0, -1}, {0, 1, 1},  {0, 1, -1},
                                                         {1, 1, 1},  {1, 1, -1}, {1, -1, 1}, {-1, 1, 1}};
 
-static double along(size_t i, const double p[3])
+static double along_direction(size_t i, const double p[3])
 {
     return directions[i][0] * p[0] + directions[i][1] * p[1] + directions[i][2] * p[2];
 }
@@ -27,10 +27,10 @@ static void extend(vgi_hull *h, size_t i, double reach, const double p[3], const
 void vgi_hull_add(vgi_hull *h, const double *points, const bool *drawn, size_t nv, const double centre[3])
 {
     for (size_t i = 0; i < VGI_HULL / 2; i++) {
-        double shift = along(i, centre), least = INFINITY, most = -INFINITY;
+        double shift = along_direction(i, centre), least = INFINITY, most = -INFINITY;
         size_t first = 0, last = 0;
         for (size_t v = 0; v < nv; v++) {
-            double x = along(i, points + 3 * v);
+            double x = along_direction(i, points + 3 * v);
             if (drawn[v] && x < least) least = x, first = v;
             if (drawn[v] && x > most) most = x, last = v;
         }

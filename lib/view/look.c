@@ -22,7 +22,7 @@ static bool is_number(const char *what, size_t *v)
     return length > 0 && strspn(what, "0123456789") == length;
 }
 
-static uint32_t nearest(const vg_body *b, const double at[3])
+static uint32_t nearest_vertex(const vg_body *b, const double at[3])
 {
     double least = INFINITY;
     uint32_t found = 0;
@@ -41,7 +41,7 @@ static bool find_joint(const vg_body *b, const char *name, uint32_t *v)
     const vg_skeleton *s = rigged ? &b->rig.skeleton : &b->skeleton;
     for (size_t j = 0; j < s->njoints; j++)
         if (!strcmp(s->joints[j].name, name)) {
-            *v = rigged ? nearest(b, b->rig.at + 3 * j) : (uint32_t)j;
+            *v = rigged ? nearest_vertex(b, b->rig.at + 3 * j) : (uint32_t)j;
             return true;
         }
     return false;

@@ -31,7 +31,7 @@ static const vgi_row *longest_of(const vg_sheet *s)
 }
 
 /* Picture i of all sequences, side by side. */
-static int compose(const vg_sheet *s, size_t i, vgi_canvas *c, unsigned char *rgb, vg_err *e)
+static int compose_picture(const vg_sheet *s, size_t i, vgi_canvas *c, unsigned char *rgb, vg_err *e)
 {
     vgi_canvas_wipe(c);
     for (size_t k = 0; k < s->nsequences; k++) {
@@ -58,7 +58,7 @@ typedef struct movie { /* `threads` pictures are drawn at a time */
 static void compose_task(void *context, size_t i)
 {
     movie *m = context;
-    m->err[i].code = compose(m->s, m->first + i, m->canvas + i, m->rgb[i], m->err + i);
+    m->err[i].code = compose_picture(m->s, m->first + i, m->canvas + i, m->rgb[i], m->err + i);
 }
 
 static int encode_pictures(movie *m, vgi_webp *webp, size_t threads, vg_err *e)

@@ -51,7 +51,7 @@ struct vg_page {
 
 /* ---- writing ---- */
 
-static int flush(vg_page *p, vg_err *e)
+static int flush_text(vg_page *p, vg_err *e)
 {
     p->bytes += p->out.size;
     int r = vgi_write_all(p->fd, p->out.data, p->out.size, p->name, e);
@@ -59,15 +59,15 @@ static int flush(vg_page *p, vg_err *e)
     return r;
 }
 
-static int put(vg_page *p, const void *data, size_t n, vg_err *e)
+static int put_bytes(vg_page *p, const void *data, size_t n, vg_err *e)
 {
     int r = vgi_bytes_append(&p->out, data, n, e);
-    return r == VG_OK && p->out.size >= FLUSH_BYTES ? flush(p, e) : r;
+    return r == VG_OK && p->out.size >= FLUSH_BYTES ? flush_text(p, e) : r;
 }
 
 static int put_text(vg_page *p, const char *text, vg_err *e)
 {
-    return put(p, text, strlen(text), e);
+    return put_bytes(p, text, strlen(text), e);
 }
 
 /* Copy the template up to a mark, which is skipped, or to its end. */
@@ -75,7 +75,7 @@ static int put_template(vg_page *p, const char *mark, vg_err *e)
 {
     const char *at = mark ? strstr(p->rest, mark) : p->rest + strlen(p->rest);
     if (!at) return vg_fail(e, VG_EARG, "the template of the page has no %s", mark);
-    int r = put(p, p->rest, (size_t)(at - p->rest), e);
+    int r = put_bytes(p, p->rest, (size_t)(at - p->rest), e);
     p->rest = at + (mark ? strlen(mark) : 0);
     return r;
 }
@@ -84,7 +84,7 @@ static int put_escaped(vg_page *p, const char *text, vg_err *e)
 {
     vg_bytes b = {0};
     int r = vgi_page_escape(&b, text, e);
-    if (r == VG_OK) r = put(p, b.data, b.size, e);
+    if (r == VG_OK) r = put_bytes(p, b.data, b.size, e);
     vg_bytes_clear(&b);
     return r;
 }
@@ -96,7 +96,7 @@ static int put_packed(vg_page *p, const vg_bytes *packed, vg_err *e)
     size_t line = LINE_BYTES - LINE_BYTES % 3;
     for (size_t at = 0; at < packed->size && r == VG_OK; at += line) {
         r = vgi_base64(&p->out, packed->data + at, packed->size - at < line ? packed->size - at : line, e);
-        if (r == VG_OK) r = flush(p, e);
+        if (r == VG_OK) r = flush_text(p, e);
     }
     return r == VG_OK ? put_text(p, "</script>\n", e) : r;
 }
@@ -190,7 +190,7 @@ static int put_mesh(vg_page *p, size_t i, const vg_head *h, vg_err *e)
 
 /* ---- sequences ---- */
 
-static int measure(sequence *s, vg_err *e)
+static int measure_sequence(sequence *s, vg_err *e)
 {
     const vg_mesh *m = &s->head->body.mesh;
     s->drawn = vgi_drawn_vertices(m, e);
@@ -209,7 +209,7 @@ int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e)
     sequence *s = p->at + p->n;
     *s = (sequence){.label = label, .head = h, .timed = true, .last_time = -INFINITY};
     size_t i = p->n++;
-    int r = measure(s, e);
+    int r = measure_sequence(s, e);
     if (r == VG_OK && !p->o.signal) r = vgi_track_init(&s->places, h->body.mesh.nv, 3, e);
     if (r == VG_OK) r = put_mesh(p, i, h, e);
     return r == VG_OK && p->o.signal ? vgi_signal_page_lists(p, &h->signal, e) : r;
@@ -238,7 +238,7 @@ static int put_chunk(vg_page *p, size_t i, const char *what, vgi_track *t, vg_er
         if (r == VG_OK) r = vgi_page_number(&head, c->step[k], e);
     }
     if (r == VG_OK) r = vgi_page_raw(&head, "\">", e);
-    if (r == VG_OK) r = put(p, head.data, head.size, e);
+    if (r == VG_OK) r = put_bytes(p, head.data, head.size, e);
     if (r == VG_OK) r = put_packed(p, &c->packed, e);
     vg_bytes_clear(&head);
     return r;
@@ -282,7 +282,7 @@ static int add_numbers(vg_page *p, sequence *s, const vg_frame *f, const double 
     size_t nv = s->head->body.mesh.nv;
     if (!s->tinted) return VG_OK;
     if (!vgi_tint_has(&p->tint, f, truth))
-        return vg_fail(e, VG_EINPUT, "frame '%s' brings no '%s' to be coloured, as those before it do", f->name,
+        return vg_fail(e, VG_EINPUT, "frame '%s' has no '%s' to colour, unlike earlier frames", f->name,
                        p->tint.name ? p->tint.name : "error");
     int r = vgi_tint_read(&p->tint, &s->meter, f, truth, &x, e);
     if (r < 0) return r;
@@ -608,11 +608,11 @@ int vg_page_end(vg_page *p, vg_page_stats *stats, vg_err *e)
     end_tint(p, stats);
     r = put_template(p, "@FACTS@", e);
     if (r == VG_OK) r = json_page(&json, p, stats, e);
-    if (r == VG_OK) r = put(p, json.data, json.size, e);
+    if (r == VG_OK) r = put_bytes(p, json.data, json.size, e);
     if (r == VG_OK) r = put_template(p, "@SCRIPT@", e);
     if (r == VG_OK) r = put_text(p, p->o.signal ? vgi_signal_js : p->o.pick ? vgi_pairs_js : vgi_page_js, e);
     if (r == VG_OK) r = put_template(p, NULL, e);
-    if (r == VG_OK) r = flush(p, e);
+    if (r == VG_OK) r = flush_text(p, e);
     vg_bytes_clear(&json);
     stats->bytes = p->bytes;
     return r;

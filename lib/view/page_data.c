@@ -130,7 +130,7 @@ static inline uint16_t remainder_of(const uint16_t *q, ptrdiff_t frame, unsigned
     return (uint16_t)x;
 }
 
-static inline uint16_t fold(uint16_t x) /* zigzag: 0 -1 1 -2 2 ... to 0 1 2 3 4 ... */
+static inline uint16_t zigzag(uint16_t x) /* zigzag: 0 -1 1 -2 2 ... to 0 1 2 3 4 ... */
 {
     return (uint16_t)(x & 0x8000 ? ~(x << 1) : x << 1);
 }
@@ -148,7 +148,7 @@ static inline __attribute__((always_inline)) uint64_t predict(const uint16_t *va
             uint16_t x = remainder_of(values + i, (ptrdiff_t)frame, how), rest = x;
             if (how & VGI_PREDICT_NEIGHBOUR) rest = (uint16_t)(x - before);
             before = x;
-            rest = fold(rest);
+            rest = zigzag(rest);
             if (upper) upper[i] = (unsigned char)(rest >> 8), lower[i] = (unsigned char)rest;
             else bits += 32U - (unsigned)__builtin_clz(2U * rest + 1U);
         }
@@ -168,7 +168,7 @@ static uint64_t count_bits(const uint16_t *q, const vgi_track *t, unsigned how)
     }
 }
 
-static unsigned choose(const vgi_track *t, size_t i)
+static unsigned choose_predictor(const vgi_track *t, size_t i)
 {
     static const unsigned ways[] = {4, 5, 6, 0, 1, 2};
     const uint16_t *q = t->q + i * t->nv * t->width;
@@ -187,7 +187,7 @@ int vgi_track_pack(vgi_track *t, vgi_chunk *c, vg_err *e)
     size_t frame = t->nv * t->width, total = t->n * frame;
     quantise(t, c);
     for (size_t i = 0; i < t->n; i++) {
-        unsigned how = choose(t, i);
+        unsigned how = choose_predictor(t, i);
         t->left[i] = (unsigned char)how;
         unsigned char *upper = t->left + t->n + i * frame;
         predict(t->q + i * frame, t, how, upper, upper + total);

@@ -8,7 +8,7 @@
 #include <stdio.h>
 
 /* In text that is not UTF-8, such as some file names, every byte beyond ASCII becomes '?'. */
-static char shown(char c, bool utf8)
+static char shown_character(char c, bool utf8)
 {
     return (unsigned char)c >= 0x80 && !utf8 ? '?' : c;
 }
@@ -18,7 +18,7 @@ int vgi_page_escape(vg_bytes *b, const char *text, vg_err *e)
     bool utf8 = vgi_is_utf8(text, strlen(text));
     int r = VG_OK;
     for (; *text && r == VG_OK; text++) {
-        char c = shown(*text, utf8);
+        char c = shown_character(*text, utf8);
         switch (c) {
         case '<': r = vgi_page_raw(b, "&lt;", e); break;
         case '>': r = vgi_page_raw(b, "&gt;", e); break;
@@ -35,7 +35,7 @@ int vgi_page_string(vg_bytes *b, const char *text, vg_err *e)
     int r = vgi_bytes_append(b, "\"", 1, e);
     bool utf8 = vgi_is_utf8(text, strlen(text));
     for (const char *c = text; *c && r == VG_OK; c++) {
-        char code[8], one = shown(*c, utf8);
+        char code[8], one = shown_character(*c, utf8);
         unsigned char u = (unsigned char)one;
         if (u < 0x20 || u == '"' || u == '\\' || u == '<' || u == 0x7f) {
             snprintf(code, sizeof code, "\\u%04x", u);

@@ -21,7 +21,7 @@ typedef struct skin {
     size_t *pictures; /* numbers of the asset's images */
 } skin;
 
-static void clear(skin *k)
+static void clear_skin(skin *k)
 {
     vgi_gltf_clear(&k->g);
     free(k->looks);
@@ -152,7 +152,7 @@ int vgi_page_skin_lists(vg_page *p, size_t i, const vg_body *b, vg_err *e)
     if (r == VG_OK && k.n) r = vgi_page_list(p, i, "materials", of_face, b->mesh.nf, false, e);
     if (r == VG_OK && k.npictures && b->attributes.ntex) r = put_coordinates(p, i, b, e);
     free(of_face);
-    clear(&k);
+    clear_skin(&k);
     return r < 0 ? r : VG_OK;
 }
 
@@ -192,6 +192,6 @@ int vgi_page_skin_facts(vg_bytes *b, const vg_body *body, vg_err *e)
     if (r == VG_OK && k.npictures) r = vgi_page_field_list(b, "pictures", &pictures, e);
     vg_bytes_clear(&looks);
     vg_bytes_clear(&pictures);
-    clear(&k);
+    clear_skin(&k);
     return r < 0 ? r : VG_OK;
 }

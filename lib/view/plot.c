@@ -38,8 +38,8 @@ typedef struct axis {
 
 /* ---- shapes ---- */
 
-static void say(plot *p, const char *format, ...) __attribute__((format(printf, 2, 3)));
-static void say(plot *p, const char *format, ...)
+static void put_shape(plot *p, const char *format, ...) __attribute__((format(printf, 2, 3)));
+static void put_shape(plot *p, const char *format, ...)
 {
     char line[400];
     va_list list;
@@ -55,7 +55,7 @@ static void say(plot *p, const char *format, ...)
 }
 
 /* Tenths of a pixel, independent of the locale. */
-static void place(double x, char to[VGI_NUMBER])
+static void print_tenths(double x, char to[VGI_NUMBER])
 {
     vgi_print_number(to, VGI_NUMBER, "%.1f", x);
 }
@@ -68,8 +68,8 @@ static void draw_line(plot *p, double x0, double y0, double x1, double y1, doubl
         return;
     }
     const double all[5] = {x0, y0, x1, y1, width};
-    for (int i = 0; i < 5; i++) place(all[i], n[i]);
-    say(p, "<path d=\"M%s %sL%s %s\" stroke=\"#%02x%02x%02x\" stroke-width=\"%s\"/>\n", n[0], n[1], n[2], n[3], c[0], c[1], c[2], n[4]);
+    for (int i = 0; i < 5; i++) print_tenths(all[i], n[i]);
+    put_shape(p, "<path d=\"M%s %sL%s %s\" stroke=\"#%02x%02x%02x\" stroke-width=\"%s\"/>\n", n[0], n[1], n[2], n[3], c[0], c[1], c[2], n[4]);
 }
 
 static void draw_bar(plot *p, double x0, double y0, double x1, double y1, const unsigned char c[3])
@@ -77,8 +77,8 @@ static void draw_bar(plot *p, double x0, double y0, double x1, double y1, const 
     char n[4][VGI_NUMBER];
     const double all[4] = {x0, y0, x1 - x0, y1 - y0};
     if (p->svg) {
-        for (int i = 0; i < 4; i++) place(all[i], n[i]);
-        say(p, "<rect x=\"%s\" y=\"%s\" width=\"%s\" height=\"%s\" fill=\"#%02x%02x%02x\"/>\n", n[0], n[1], n[2], n[3], c[0], c[1], c[2]);
+        for (int i = 0; i < 4; i++) print_tenths(all[i], n[i]);
+        put_shape(p, "<rect x=\"%s\" y=\"%s\" width=\"%s\" height=\"%s\" fill=\"#%02x%02x%02x\"/>\n", n[0], n[1], n[2], n[3], c[0], c[1], c[2]);
         return;
     }
     for (double y = floor(y0) + 0.5; y < y1; y++) vgi_paint_line(&p->canvas, (double[]){x0 + 0.5, y}, (double[]){x1 - 0.5, y}, 1.2, c);
@@ -92,8 +92,8 @@ static void draw_dot(plot *p, double x, double y, double radius, const unsigned 
         vgi_paint_disc(&p->canvas, (double[]){x, y}, radius, c);
         return;
     }
-    place(x, n[0]), place(y, n[1]), place(radius, n[2]);
-    say(p, "<circle cx=\"%s\" cy=\"%s\" r=\"%s\" fill=\"#%02x%02x%02x\"/>\n", n[0], n[1], n[2], c[0], c[1], c[2]);
+    print_tenths(x, n[0]), print_tenths(y, n[1]), print_tenths(radius, n[2]);
+    put_shape(p, "<circle cx=\"%s\" cy=\"%s\" r=\"%s\" fill=\"#%02x%02x%02x\"/>\n", n[0], n[1], n[2], c[0], c[1], c[2]);
 }
 
 /* Text as XML; control characters, which XML does not allow, become blanks. */
@@ -101,10 +101,10 @@ static void say_text(plot *p, const char *text)
 {
     for (; *text; text++) {
         unsigned char c = (unsigned char)*text;
-        if (c == '&') say(p, "&amp;");
-        else if (c == '<') say(p, "&lt;");
-        else if (c == '>') say(p, "&gt;");
-        else say(p, "%c", c < 32 || c == 127 ? ' ' : c);
+        if (c == '&') put_shape(p, "&amp;");
+        else if (c == '<') put_shape(p, "&lt;");
+        else if (c == '>') put_shape(p, "&gt;");
+        else put_shape(p, "%c", c < 32 || c == 127 ? ' ' : c);
     }
 }
 
@@ -118,11 +118,11 @@ static void draw_text(plot *p, double x, double y, enum anchor anchor, bool stro
         vgi_text(&p->canvas, x, y, &(vgi_lettering){c, strong ? 1.2 * LETTER : LETTER, share, 0}, text);
         return;
     }
-    place(x, n[0]), place(y, n[1]);
-    say(p, "<text x=\"%s\" y=\"%s\" text-anchor=\"%s\" fill=\"#%02x%02x%02x\"%s>", n[0], n[1], anchors[anchor], c[0], c[1], c[2],
+    print_tenths(x, n[0]), print_tenths(y, n[1]);
+    put_shape(p, "<text x=\"%s\" y=\"%s\" text-anchor=\"%s\" fill=\"#%02x%02x%02x\"%s>", n[0], n[1], anchors[anchor], c[0], c[1], c[2],
         strong ? " font-weight=\"bold\"" : "");
     say_text(p, text);
-    say(p, "</text>\n");
+    put_shape(p, "</text>\n");
 }
 
 /* ---- axes ---- */
@@ -133,7 +133,7 @@ static double at(const axis *a, double x)
     return a->from + share * (a->to - a->from);
 }
 
-static void widen(axis *a, double x)
+static void widen_axis(axis *a, double x)
 {
     if (a->log && !(x > 0)) return;
     double place = a->log ? log10(x) : x;
@@ -176,8 +176,8 @@ static void fit_axes(const vg_chart *c, axis *x, axis *y)
 {
     for (size_t s = 0; s < c->n; s++) {
         const vg_series *v = c->series + s;
-        for (size_t i = 0; i < v->n + (c->bars && v->n > 0); i++) widen(x, v->x ? v->x[i] : (double)i);
-        for (size_t i = 0; i < v->n; i++) widen(y, v->y[i]);
+        for (size_t i = 0; i < v->n + (c->bars && v->n > 0); i++) widen_axis(x, v->x ? v->x[i] : (double)i);
+        for (size_t i = 0; i < v->n; i++) widen_axis(y, v->y[i]);
     }
     end_axis(x, false, 10);
     end_axis(y, true, 5);
@@ -273,11 +273,11 @@ int vg_plot_write(const vg_chart *charts, size_t n, bool svg, int fd, const char
     int r = vgi_canvas_init(&p.canvas, WIDTH, n * HEIGHT, e); /* of an SVG only the font is used */
     if (r < 0) goto out;
     if (svg)
-        say(&p, "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%zu\" viewBox=\"0 0 %d %zu\" "
+        put_shape(&p, "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%zu\" viewBox=\"0 0 %d %zu\" "
             "font-family=\"sans-serif\" font-size=\"%d\" fill=\"none\">\n<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n",
             WIDTH, p.canvas.h, WIDTH, p.canvas.h, LETTER);
     for (size_t i = 0; i < n; i++) draw_chart(&p, charts + i, (double)(i * HEIGHT));
-    if (svg) say(&p, "</svg>\n");
+    if (svg) put_shape(&p, "</svg>\n");
     r = p.failed < 0 ? p.failed : vgi_font_check(p.canvas.font, e);
     if (r == VG_OK) r = svg ? vgi_write_all(fd, p.text, p.size, name, e) : write_png(&p, fd, name, e);
 out:

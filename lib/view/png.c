@@ -32,7 +32,7 @@ static void on_warning(png_structp png, png_const_charp message)
     (void)png, (void)message; /* libpng warns about colour profiles and the like, which are not written */
 }
 
-static int flush(vgi_png *p)
+static int flush_png(vgi_png *p)
 {
     int r = vgi_write_all(p->fd, p->out.data, p->out.size, p->name, &p->err);
     p->out.size = 0;
@@ -43,7 +43,7 @@ static void on_write(png_structp png, png_bytep data, size_t n)
 {
     vgi_png *p = png_get_io_ptr(png);
     int r = vgi_bytes_append(&p->out, data, n, &p->err);
-    if (r == VG_OK && p->out.size >= FLUSH_BYTES) r = flush(p);
+    if (r == VG_OK && p->out.size >= FLUSH_BYTES) r = flush_png(p);
     if (r < 0) png_longjmp(png, 1);
 }
 
@@ -58,7 +58,7 @@ static int give_error(const vgi_png *p, vg_err *e)
     return p->err.code;
 }
 
-static int start(vgi_png *p, size_t w, size_t h)
+static int start_png(vgi_png *p, size_t w, size_t h)
 {
     p->png = png_create_write_struct(PNG_LIBPNG_VER_STRING, p, on_error, on_warning);
     p->info = p->png ? png_create_info_struct(p->png) : NULL;
@@ -87,7 +87,7 @@ int vgi_png_open(vgi_png **out, int fd, const char *name, size_t w, size_t h, vg
     p->fd = fd;
     p->w = w;
     p->name = vgi_copy_string(name, strlen(name), &p->err);
-    int r = p->name ? start(p, w, h) : VG_ENOMEM;
+    int r = p->name ? start_png(p, w, h) : VG_ENOMEM;
     if (r < 0) {
         give_error(p, e);
         vgi_png_close(&p);
@@ -107,7 +107,7 @@ int vgi_png_end(vgi_png *p, vg_err *e)
 {
     if (setjmp(png_jmpbuf(p->png))) return give_error(p, e);
     png_write_end(p->png, NULL);
-    return flush(p) < 0 ? give_error(p, e) : VG_OK;
+    return flush_png(p) < 0 ? give_error(p, e) : VG_OK;
 }
 
 void vgi_png_close(vgi_png **address)

@@ -338,7 +338,7 @@ static void put_legend(chart *c)
                                                 : "distance of the shapes from a cubic spline through the frames", "");
 }
 
-static int draw(chart *c, vg_err *e)
+static int draw_chart(chart *c, vg_err *e)
 {
     fit_plane(c);
     int r = choose_colours(c, e);
@@ -372,10 +372,10 @@ static int write_picture(const chart *c, int fd, const char *name, vg_err *e)
 int vg_plane_write(const vg_head *h, const vg_plane_options *o, int fd, const char *name, vg_err *e)
 {
     chart c = {.h = h, .s = &h->signal, .o = o};
-    if (!h->signal.n) return vg_fail(e, VG_EINPUT, "there is no signal to be drawn");
+    if (!h->signal.n) return vg_fail(e, VG_EINPUT, "there is no signal to draw");
     int r = vg_signal_trace(&c.trace, c.s, PARTS, e);
     if (r == VG_OK) r = vgi_canvas_init(&c.canvas, WIDTH, HEIGHT, e);
-    if (r == VG_OK) r = draw(&c, e);
+    if (r == VG_OK) r = draw_chart(&c, e);
     if (r == VG_OK) r = write_picture(&c, fd, name, e);
     vg_trace_clear(&c.trace);
     vgi_figure_clear(&c.figure);

@@ -37,7 +37,7 @@ static int16_t pack(float x)
     return (int16_t)(x * 32767 + (x < 0 ? -0.5f : 0.5f));
 }
 
-static void put(vgi_sample *s, float z, const float n[3], float value, int kind)
+static void put_sample(vgi_sample *s, float z, const float n[3], float value, int kind)
 {
     s->z = z;
     for (int k = 0; k < 3; k++) s->normal[k] = pack(vgi_least(vgi_most(n[k], -1), 1));
@@ -92,7 +92,7 @@ static void fill_sample(vgi_sample *s, const vgi_corner *const c[3], const float
     float n[3];
     for (int k = 0; k < 3; k++)
         n[k] = facing * (w[0] * c[0]->normal[k] + w[1] * c[1]->normal[k] + w[2] * c[2]->normal[k]);
-    put(s, z, n, w[0] * c[0]->value + w[1] * c[1]->value + w[2] * c[2]->value, facing > 0 ? VGI_FRONT : VGI_BACK);
+    put_sample(s, z, n, w[0] * c[0]->value + w[1] * c[1]->value + w[2] * c[2]->value, facing > 0 ? VGI_FRONT : VGI_BACK);
 }
 
 static bool near_edge(const float w[3], const float height[3], unsigned edges, float width)
@@ -145,7 +145,7 @@ static void draw_triangle(vgi_raster *raster, const vgi_corner *const corner[3],
 
 /* The part of a row inside the strip of the given radius around the line a-b; the caller has clipped to the box of
  * the rounded ends. */
-static void strip(const vgi_corner *a, float dx, float dy, float reach, double y, size_t *x0, size_t *x1)
+static void strip_span(const vgi_corner *a, float dx, float dy, float reach, double y, size_t *x0, size_t *x1)
 {
     if (fabsf(dy) < 1e-3f) return;
     double middle = a->x + (y - a->y) * dx / dy, half = reach / fabsf(dy) + 1;
@@ -164,7 +164,7 @@ static void draw_wire(vgi_raster *raster, const vgi_corner *a, const vgi_corner 
     for (size_t y = s.y0; y < s.y1; y++) {
         size_t x0 = s.x0, x1 = s.x1;
         float py = (float)y + 0.5f;
-        strip(a, dx, dy, radius * sqrtf(square), py, &x0, &x1);
+        strip_span(a, dx, dy, radius * sqrtf(square), py, &x0, &x1);
         for (size_t x = x0; x < x1; x++) {
             float px = (float)x + 0.5f;
             float t = square > 0 ? vgi_least(vgi_most(((px - a->x) * dx + (py - a->y) * dy) / square, 0), 1) : 0;
@@ -172,7 +172,7 @@ static void draw_wire(vgi_raster *raster, const vgi_corner *a, const vgi_corner 
             if (off > 1) continue;
             float n[3] = {ox, -oy, sqrtf(1 - off)}, z = a->z + t * (b->z - a->z) + radius * n[2];
             vgi_sample *sample = raster->at + y * raster->w + x;
-            if (z > sample->z) put(sample, z, n, a->value + t * (b->value - a->value), kind);
+            if (z > sample->z) put_sample(sample, z, n, a->value + t * (b->value - a->value), kind);
         }
     }
 }

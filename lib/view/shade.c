@@ -20,7 +20,7 @@ static const float clay_back[3] = {0.265f, 0.375f, 0.545f};
 static const float wire_colour[3] = {0.110f, 0.150f, 0.220f}, contour_colour[3] = {0.012f, 0.014f, 0.020f};
 static const float page_top[3] = {0.905f, 0.913f, 0.930f}, page_bottom[3] = {0.740f, 0.757f, 0.785f};
 
-static float dot(const float a[3], const float b[3])
+static float dot3(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -52,7 +52,7 @@ static void unit_normal(const vgi_sample *s, float n[3])
 {
     for (int k = 0; k < 3; k++) n[k] = s->normal[k];
     if (n[2] < 0) n[2] = 0; /* a smooth normal may face away at the outline */
-    float size = sqrtf(dot(n, n));
+    float size = sqrtf(dot3(n, n));
     if (!(size > 0)) n[0] = n[1] = 0, n[2] = size = 1;
     for (int k = 0; k < 3; k++) n[k] /= size;
 }
@@ -75,7 +75,7 @@ static void turn_taps(pixels *p)
 /* How much of the sky of sample s its neighbour, d away from it, hides. Nothing where that is empty: d is infinite. */
 static float hidden(const float n[3], const float d[3], float reach)
 {
-    float square = dot(d, d), near = 1 - square / (reach * reach), above = dot(n, d);
+    float square = dot3(d, d), near = 1 - square / (reach * reach), above = dot3(n, d);
     if (!(near > 0 && above > 0)) return 0;
     float cosine = above / sqrtf(square) - 0.12f;
     return cosine > 0 ? cosine * near : 0;
@@ -169,8 +169,8 @@ static float outline(const vgi_raster *raster, size_t x, size_t y, size_t reach,
 
 static void light_clay(const float n[3], const float albedo[3], float sky_seen_here, float out[3])
 {
-    float k = clamp01((dot(n, key) + 0.08f) / 1.08f), f = clamp01(dot(n, fill)), sky = 0.5f + 0.5f * n[1];
-    float r = clamp01(dot(n, rim)), h = clamp01(dot(n, half_way)), open = sky_seen_here * sky_seen_here;
+    float k = clamp01((dot3(n, key) + 0.08f) / 1.08f), f = clamp01(dot3(n, fill)), sky = 0.5f + 0.5f * n[1];
+    float r = clamp01(dot3(n, rim)), h = clamp01(dot3(n, half_way)), open = sky_seen_here * sky_seen_here;
     float gloss = h * h, edge = r * r * 0.55f * sky_seen_here;
     gloss *= gloss, gloss *= gloss, gloss *= gloss, gloss *= gloss; /* to the power 32 */
     gloss *= 0.055f * sky_seen_here;
@@ -187,7 +187,7 @@ static void light_clay(const float n[3], const float albedo[3], float sky_seen_h
 /* A factor that is 1 on an unoccluded surface facing the viewer, so that its colours match the legend. */
 static float light_error(const float n[3], float sky_seen_here)
 {
-    float facing = (key[2] + 0.3f) / 1.3f, k = clamp01((dot(n, key) + 0.3f) / 1.3f) / facing;
+    float facing = (key[2] + 0.3f) / 1.3f, k = clamp01((dot3(n, key) + 0.3f) / 1.3f) / facing;
     return (0.38f + 0.62f * vgi_least(k, 1.12f)) * (0.25f + 0.75f * sky_seen_here);
 }
 
@@ -264,7 +264,7 @@ static bool mean_sample(const vgi_raster *raster, const vgi_sample *first, size_
     mean->value = (uint16_t)(value / n);
     for (int k = 0; k < 3; k++) mean->normal[k] = (int16_t)(normal[k] / n);
     float size[3] = {mean->normal[0], mean->normal[1], mean->normal[2]};
-    return dot(size, size) > 0.98f * 0.98f * 32767 * 32767;
+    return dot3(size, size) > 0.98f * 0.98f * 32767 * 32767;
 }
 
 /* The sum of the colours of a pixel's samples; returns how many are empty. */

@@ -80,7 +80,7 @@ int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg
         return vg_fail(e, VG_EARG, "a sheet has at most %d sequences", VG_SHEET_SEQUENCES);
     if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a sheet shows vertices, not %s", vg_head_form(h));
     if (truth && truth->body.mesh.nv != h->body.mesh.nv)
-        return vg_fail(e, VG_EARG, "a sequence and its truth have another number of vertices");
+        return vg_fail(e, VG_EARG, "a sequence and its truth have different numbers of vertices");
     vgi_row *q = s->at + s->nsequences++;
     *q = (vgi_row){.label = label, .head = h};
     int r = vgi_figure_init(&q->figure, &h->body.mesh, e);
@@ -108,7 +108,7 @@ static int keep_numbers(vg_sheet *s, vgi_row *q, vgi_shot *shot, const vg_frame 
     bool has = vgi_tint_has(&s->tint, f, truth);
     if (q->album.seen == 1) q->tinted = has;
     if (q->tinted && !has)
-        return vg_fail(e, VG_EINPUT, "frame '%s' brings no '%s' to be coloured, as those before it do", f->name,
+        return vg_fail(e, VG_EINPUT, "frame '%s' has no '%s' to colour, unlike earlier frames", f->name,
                        s->tint.name ? s->tint.name : "error");
     if (!q->tinted) return VG_OK;
     s->tinted = shot->has_numbers = true;
@@ -141,7 +141,7 @@ static int choose_frames(vg_sheet *s, vg_err *e)
     for (size_t i = 1; i < s->nsequences; i++)
         if (s->at[i].album.seen > longest->album.seen) longest = s->at + i;
     s->n = vgi_album_close(&longest->album);
-    if (s->n == 0) return vg_fail(e, VG_EINPUT, "there is no frame to be drawn");
+    if (s->n == 0) return vg_fail(e, VG_EINPUT, "there is no frame to draw");
     size_t *frames = vgi_array_raw(s->n, sizeof *frames, e);
     int r = frames ? VG_OK : VG_ENOMEM;
     for (size_t i = 0; i < s->n && r == VG_OK; i++) frames[i] = longest->album.at[i].index;
@@ -538,7 +538,7 @@ static int print_sheet(press *p, const vg_sheet *s, vg_err *e)
 
 int vg_sheet_write(vg_sheet *s, int fd, const char *name, vg_err *e)
 {
-    if (s->nsequences == 0) return vg_fail(e, VG_EINPUT, "there is no frame to be drawn");
+    if (s->nsequences == 0) return vg_fail(e, VG_EINPUT, "there is no frame to draw");
     int r = choose_frames(s, e);
     if (r == VG_OK) r = choose_colours(s, e);
     if (r < 0) return r;

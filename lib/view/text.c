@@ -1,5 +1,5 @@
-/* text.c: lines of text in a real font, in any script for which the machine has one. The only file that includes FreeType
- * and Fontconfig. Leaves out what the scripts of India and Arabic need beyond one glyph after another.
+/* text.c: lines of text in a font, in any script for which the machine has one. No other file includes FreeType and
+ * Fontconfig. Complex shaping, as the scripts of India and Arabic need it, is not done.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 

@@ -104,7 +104,8 @@ static int same_name(vgi_tint *t, const vg_frame *f, vg_err *e)
     }
     if (!strcmp(t->name, c->name) && !strcmp(t->unit, c->unit)) return VG_OK;
     return vg_fail(e, VG_EINPUT,
-                   "frame '%s' brings '%s' in '%s', those before it '%s' in '%s': colours cannot say both", f->name,
+                   "frame '%s' has '%s' in '%s', but earlier frames have '%s' in '%s': one colour map cannot show "
+                   "both", f->name,
                    c->name, c->unit, t->name, t->unit);
 }
 

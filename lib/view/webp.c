@@ -33,7 +33,7 @@ int vgi_webp_open(vgi_webp **out, size_t w, size_t h, vg_err *e)
     p->w = w, p->h = h;
     if (!WebPAnimEncoderOptionsInit(&o) || !WebPConfigPreset(&p->config, WEBP_PRESET_DRAWING, quality)) {
         vgi_webp_close(&p);
-        return vg_fail(e, VG_ESYS, "libwebp is of another version than the one this program was built for");
+        return vg_fail(e, VG_ESYS, "libwebp is not the version that this program was built with");
     }
     p->config.method = 4;
     p->encoder = WebPAnimEncoderNew((int)w, (int)h, &o);

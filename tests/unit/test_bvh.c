@@ -228,18 +228,18 @@ static void refuses(void)
     check_refused(ARM("0", "Frames: 99999\nFrame Time: 1e307\n"), VG_EINPUT, "the frame time is too large");
     check_refused(ARM("0", "Frames: 1\nFrame Time: inf\n"), VG_EINPUT, "'inf' is not a finite number");
     check_refused(ARM("0", "Frames: 2\nFrame Time: 1\n1 2 3 4 5 6\n1 2 3 4 5\n"),
-                  VG_ETRUNC, "ends in frame 1 of 2, behind 5 of 6 values");
+                  VG_ETRUNC, "ends in frame 1 of 2, after 5 of 6 values");
     check_refused(ARM("0", "Frames: 1000000000000000000\nFrame Time: 1\n1 2 3 4 5 6\n"),
                   VG_ETRUNC, "ends in frame 1 of");
     check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 6 7\n"),
-                  VG_EINPUT, "line 19: a row of 7 values, and the channels are 6");
+                  VG_EINPUT, "line 19: a row has 7 values, but there are 6 channels");
     check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 x\n"),
                   VG_EINPUT, "line 19: a number expected, not 'x'");
     check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 1e999\n"), VG_EINPUT, "not a finite number");
     check_refused("HIERARCHY ROOT a\n{ OFFSET 0 0 0 } MOTION Frames: 999999999999999999 Frame Time: 1\n",
                   VG_ETRUNC, "fewer than the");
     check_refused("HIERARCHY ROOT a\n{ OFFSET 0 0 1e308 JOINT b\n{ OFFSET 0 0 1e308 } } MOTION Frames: 0 Frame Time: 1\n",
-                  VG_EINPUT, "joint 'b' is at a position that no number can hold");
+                  VG_EINPUT, "the position of joint 'b' is too large");
 }
 
 /* Each prefix of a file is refused, in words, but those that only lack the line end, and the hierarchy alone, which is a
@@ -593,7 +593,7 @@ static void says_what_is_lost(void)
     free(text);
     s.time[2] = 0.6;
     text = write_text(&s, false, warning, &e);
-    CHECK(text && strstr(warning, "; the times of the frames: they are not at equal distances") &&
+    CHECK(text && strstr(warning, "; the times of the frames, which are not evenly spaced") &&
           strstr(text, " 0.2500000000\n"));
     free(text);
     s.timed[0] = s.timed[1] = s.timed[2] = false;

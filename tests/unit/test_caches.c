@@ -120,7 +120,7 @@ static void refuses_false_numbers(void)
     set(&b, 20, 0, false);
     set(&b, 12, 2, false);
     CHECK(refused(&vgi_sequence_pc2, b.data, b.size) == VG_EINPUT);
-    CHECK_TEXT(message, "'x' is a PC2 cache of version 2: only version 1 is known");
+    CHECK_TEXT(message, "'x' is a PC2 cache of version 2: only version 1 is supported");
     set(&b, 12, 1, false);
     set(&b, 32 + 4 * 10, inf, false);
     CHECK(refused(&vgi_sequence_pc2, b.data, b.size) == VG_EINPUT);
@@ -165,7 +165,7 @@ static void writes_pc2(void)
     frames[2].time = 1.2;
     made = record(&vgi_sequence_pc2, &head, frames, 3, false, &r, warning), want = make_pc2(0, 1);
     CHECK(r == VG_OK && made.size == want.size && !memcmp(made.data, want.data, want.size));
-    CHECK_TEXT(warning, "the times of the frames: they are not at equal distances");
+    CHECK_TEXT(warning, "the times of the frames, which are not evenly spaced");
     vg_bytes_clear(&made);
     vg_bytes_clear(&want);
 }

@@ -426,7 +426,7 @@ static void refuses_broken_ply(void)
         {"ply\nformat ascii 1.0\nelement vertex 9\n" XYZ "end_header\n1 2 3\n",
          "'x' announces 9 of element 'vertex', but ends before"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ "end_header\n1 2 a\n",
-         "'x': 'a' in vertex 0 is no number that fits there"},
+         "'x': 'a' in vertex 0 is not a valid number"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ "end_header\n1 2 nan\n", "'x': vertex 0 is not finite"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n3 0 1 1\n",
          "'x': face 0 names vertex 1 of 1"},
@@ -437,7 +437,7 @@ static void refuses_broken_ply(void)
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n4000000000 0 1 2\n",
          "'x' ends in face 0 of 1"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n3 0 1.5 2\n",
-         "'x': a number in face 0 should be whole and is 1.5"},
+         "'x': a number in face 0 should be an integer but is 1.5"},
         {"ply\nformat ascii 1.0\nelement vertex 0\n" XYZ "end_header\n", "'x' has no vertices"},
         {"ply\nformat ascii 1.0\nend_header\n", "'x' has no vertices"},
         {"ply\nelement vertex 0\n" XYZ "end_header\n", "'x': the PLY header has no format line"},
@@ -524,9 +524,9 @@ static void refuses_broken_off(void)
          "'x' announces 1000000000 vertices and 1000000000 faces, but ends before"},
         {"OFF\n9223372036854775807 9223372036854775807 0\n0 0 0\n",
          "'x' announces 9223372036854775807 vertices and 9223372036854775807 faces, but ends before"},
-        {"OFF BINARY\n", "'x' is binary OFF, which is not read: write it as text"},
-        {"4OFF\n1 0 0\n0 0 0 1\n", "'x' is 4OFF, with vertices of other than 3 coordinates, which is not read"},
-        {"nOFF\n3\n1 0 0\n0 0 0\n", "'x' is nOFF, with vertices of other than 3 coordinates, which is not read"},
+        {"OFF BINARY\n", "'x' is binary OFF, which is not supported: write it as text"},
+        {"4OFF\n1 0 0\n0 0 0 1\n", "'x' is 4OFF, whose vertices do not have 3 coordinates, which is not supported"},
+        {"nOFF\n3\n1 0 0\n0 0 0\n", "'x' is nOFF, whose vertices do not have 3 coordinates, which is not supported"},
     };
     for (size_t i = 0; i < sizeof broken / sizeof *broken; i++)
         CHECK_READS(broken[i].text, strlen(broken[i].text), broken[i].message);
@@ -580,7 +580,7 @@ static void says_what_is_no_mesh(void)
     CHECK(vg_model_read(&m, "", 0, NULL, "a.obj", &e) == VG_ETRUNC);
     CHECK_TEXT(e.message, "'a.obj' is empty");
     CHECK(vg_model_read(&m, "hello\n", 6, NULL, "a.txt", &e) == VG_EINPUT);
-    CHECK_TEXT(e.message, "'a.txt' is no mesh file (read: OBJ, PLY, OFF, STL)");
+    CHECK_TEXT(e.message, "'a.txt' is not a mesh file (read: OBJ, PLY, OFF, STL)");
     CHECK(vg_model_read(&m, "hello\n", 6, NULL, "a.obj", &e) == VG_EINPUT); /* told by the name */
     CHECK_TEXT(e.message, "'a.obj' has no vertices (no line 'v x y z')");
     CHECK(vg_model_read(&m, "hello\n", 6, "ply", "a", &e) == VG_EINPUT);

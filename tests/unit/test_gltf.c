@@ -460,18 +460,18 @@ static void malformed_is_refused(void)
 #define NODE "'nodes':[{'mesh':0}],"
     static const struct { const char *json, *says; } cases[] = {
         {MESH GOOD, "shows no mesh"},
-        {NODE GOOD, "'meshes' that is not there"},
+        {NODE GOOD, "'meshes' that does not exist"},
         {"'nodes':[{'mesh':0,'children':[1]},{'children':[0]}]," MESH GOOD, "in a cycle"},
         {"'nodes':[{'mesh':0,'children':[0]}]," MESH GOOD, "in a cycle"},
         {"'nodes':[{'children':[2]},{'children':[2]},{'mesh':0}]," MESH GOOD, "two parents"},
-        {"'nodes':[{'mesh':0,'children':[1]}]," MESH GOOD, "'nodes' that is not there"},
-        {"'nodes':[{'mesh':-1}]," MESH GOOD, "'meshes' that is not there"},
+        {"'nodes':[{'mesh':0,'children':[1]}]," MESH GOOD, "'nodes' that does not exist"},
+        {"'nodes':[{'mesh':-1}]," MESH GOOD, "'meshes' that does not exist"},
         {"'nodes':[{'mesh':0,'scale':[1,1]}]," MESH GOOD, "is not 3 numbers"},
         {"'nodes':[{'mesh':0,'scale':[1e300,1e300,1e300]},{'mesh':0,'matrix':[1e999]}]," MESH GOOD, "wrong JSON"},
         {NODE MESH "'accessors':[" FLOATS(0, 4000000000, "VEC3") "]", "goes beyond its buffer view"},
         {NODE MESH "'accessors':[" FLOATS(0, 18446744073709551615, "VEC3") "]", "wrong JSON"},
-        {NODE MESH "'accessors':[" FLOATS(0, -3, "VEC3") "]", "'count' is not a whole number"},
-        {NODE MESH "'accessors':[" FLOATS(0, 1.5, "VEC3") "]", "'count' is not a whole number"},
+        {NODE MESH "'accessors':[" FLOATS(0, -3, "VEC3") "]", "'count' is not an integer"},
+        {NODE MESH "'accessors':[" FLOATS(0, 1.5, "VEC3") "]", "'count' is not an integer"},
         {NODE MESH "'accessors':[" FLOATS(0, 0, "VEC3") "]", "has 0 elements"},
         {NODE MESH "'accessors':[" FLOATS(28, 3, "VEC3") "]", "goes beyond its buffer view"},
         {NODE MESH "'accessors':[" FLOATS(9007199254740991, 3, "VEC3") "]", "goes beyond its buffer view"},
@@ -479,23 +479,23 @@ static void malformed_is_refused(void)
         {NODE MESH "'accessors':[" FLOATS(12, 3, "VEC3") "]", "not a finite number"},
         {NODE MESH "'accessors':[{'componentType':5126,'count':9000000000,'type':'VEC3'}]", "has no bytes"},
         {NODE MESH "'accessors':[{'bufferView':0,'componentType':5130,'count':3,'type':'VEC3'}]", "componentType is not known"},
-        {NODE MESH "'accessors':[{'bufferView':7,'componentType':5126,'count':3,'type':'VEC3'}]", "'bufferViews' that is not there"},
+        {NODE MESH "'accessors':[{'bufferView':7,'componentType':5126,'count':3,'type':'VEC3'}]", "'bufferViews' that does not exist"},
         {NODE MESH GOOD ",'bufferViews':[{'buffer':0,'byteLength':60,'byteStride':8}]", "byteStride is less than an element"},
         {NODE MESH GOOD ",'extensionsRequired':['KHR_draco_mesh']", "requires the extension 'KHR_draco_mesh', which is not known"},
         {NODE "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],'accessors':[" FLOATS(0, 3, "VEC3")
-         ",{'bufferView':0,'byteOffset':48,'componentType':5125,'count':3,'type':'SCALAR'}]", "an index is 1084227584 where there are 3"},
+         ",{'bufferView':0,'byteOffset':48,'componentType':5125,'count':3,'type':'SCALAR'}]", "an index is 1084227584, but there are 3"},
         {NODE "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':0}]}]," GOOD, "of another type"},
         {NODE "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':1}]}]}],'accessors':[" FLOATS(0, 3, "VEC3") ","
          FLOATS(0, 2, "VEC3") "]", "has 2 elements, not 3"},
         {NODE "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'mode':7}]}]," GOOD, "mode is not known"},
-        {NODE MESH "'accessors':[" FLOATS(0, 2, "VEC3") "]", "do not make whole triangles"},
+        {NODE MESH "'accessors':[" FLOATS(0, 2, "VEC3") "]", "do not form complete triangles"},
         {NODE MESH "'animations':[{'channels':[{'sampler':0,'target':{'node':0,'path':'scale'}}],'samplers':[{'input':1,'output':0}]}],"
          "'accessors':[" FLOATS(0, 3, "VEC3") "," FLOATS(48, 3, "SCALAR") "]", "times of an animation do not ascend"},
-        {NODE MESH "'animations':[{'channels':[{'sampler':1,'target':{'node':0,'path':'scale'}}],'samplers':[]}]," GOOD, "sampler that is not there"},
+        {NODE MESH "'animations':[{'channels':[{'sampler':1,'target':{'node':0,'path':'scale'}}],'samplers':[]}]," GOOD, "sampler that does not exist"},
         {"'nodes':[{'mesh':0,'matrix':[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}]," MESH "'animations':[{'channels':[{'sampler':0,"
          "'target':{'node':0,'path':'scale'}}],'samplers':[{'input':1,'output':0}]}],'accessors':[" FLOATS(0, 3, "VEC3") ","
          FLOATS(0, 1, "SCALAR") "]", "is animated and has a matrix"},
-        {"'nodes':[{'mesh':0,'skin':0}],'skins':[{'joints':[5]}]," MESH GOOD, "'nodes' that is not there"},
+        {"'nodes':[{'mesh':0,'skin':0}],'skins':[{'joints':[5]}]," MESH GOOD, "'nodes' that does not exist"},
         {NODE MESH "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3','sparse':{'count':2,"
          "'indices':{'bufferView':0,'componentType':5121},'values':{'bufferView':0}}}]", "do not ascend"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -507,7 +507,7 @@ static void malformed_is_refused(void)
     }
     vg_bytes b = make(NODE MESH GOOD, bin, 36); /* an empty chunk behind the end that the file says it has */
     CHECK(vgi_bytes_append(&b, "\0\0\0\0XXXX", 8, NULL) == VG_OK);
-    CHECK(refused(&vgi_sequence_glb, b.data, b.size) == VG_EINPUT && strstr(message, "bytes behind the end of the GLB"));
+    CHECK(refused(&vgi_sequence_glb, b.data, b.size) == VG_EINPUT && strstr(message, "bytes after the end of the GLB"));
     vg_bytes_clear(&b);
 }
 

@@ -230,11 +230,11 @@ static void markers_as_text(void)
     } wrong[] = {{"", "'f' names no pair of vertices"},
                  {"1\n", "'f' line 1: a marker is 'SOURCE TARGET' or 'NAME SOURCE TARGET'"},
                  {"1 2\na b 1 2\n", "'f' line 2: a marker is 'SOURCE TARGET' or 'NAME SOURCE TARGET'"},
-                 {"1 x", "'f' line 1: 'x' is no vertex number"},
-                 {"1 2.5", "'f' line 1: '2.5' is no vertex number"},
+                 {"1 x", "'f' line 1: 'x' is not a vertex number"},
+                 {"1 2.5", "'f' line 1: '2.5' is not a vertex number"},
                  {"1 -2", "'f' line 1: there is no vertex -2: vertices are counted from 0"},
                  {"1 5000000000", "'f' line 1: there is no vertex 5000000000: vertices are counted from 0"},
-                 {"1 99999999999999999999", "'f' line 1: '99999999999999999999' is no vertex number"},
+                 {"1 99999999999999999999", "'f' line 1: '99999999999999999999' is not a vertex number"},
                  {"\377 1 2", "'f' line 1: the name is not UTF-8"}};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         vg_err e = {0, ""};
@@ -473,10 +473,10 @@ static void refusals(void)
     vg_markers two = read_markers("0 0\n1 1\n", 0), line = read_markers("0 0\n1 1\n0 0\n1 1\n", 0),
                far = read_markers("a 0 63", 0);
     vg_register_input in = between(&h, &h, &two);
-    CHECK(refused(&in, "2 pairs do not say how the meshes lie: give at least three that are not in line") ==
+    CHECK(refused(&in, "2 pairs do not determine the alignment: give at least three that are not collinear") ==
           VG_EINPUT);
     in.markers = &line;
-    CHECK(refused(&in, "4 pairs do not say how the meshes lie: give at least three that are not in line") ==
+    CHECK(refused(&in, "4 pairs do not determine the alignment: give at least three that are not collinear") ==
           VG_EINPUT);
     in.markers = &far;
     CHECK(refused(&in, "marker 'a' names vertex 63, but the target has 63 vertices") == VG_EINPUT);
@@ -495,7 +495,7 @@ static void refusals(void)
     for (size_t i = 0; i < away.body.mesh.nv; i++) away.body.reference[3 * i] += 100;
     in = between(&h, &away, NULL);
     in.aligned = true;
-    CHECK(refused(&in, "no face of the target comes near a face of the source that looks the same way") == VG_EINPUT);
+    CHECK(refused(&in, "no face of the target is near a source face with a similar normal") == VG_EINPUT);
     vg_markers_clear(&two);
     vg_markers_clear(&line);
     vg_markers_clear(&far);

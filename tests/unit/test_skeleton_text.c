@@ -53,7 +53,7 @@ static void test_groups_refused(void)
         {"r - vertices 0\na a vertices 1\n", "has a cycle of joints"},
         {"a - vertices 1 2 1\n", "line 1: joint 'a' has a vertex twice"},
         {"a - vertices 1 -2\n", "there is no vertex -2"},
-        {"a - vertices 1 2.5\n", "'2.5' is no vertex number"},
+        {"a - vertices 1 2.5\n", "'2.5' is not a vertex number"},
         {"a - vertices 4294967295\n", "there is no vertex 4294967295"},
         {"\xff - vertices 1\n", "not UTF-8"},
     };

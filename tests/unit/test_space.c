@@ -240,7 +240,7 @@ static void what_is_refused(void)
     for (int i = 0; i < 8; i++) add_vertex(&h, i, i * i, 0);
     if (vg_head_graph(&g, &h, &e) < 0) abort();
     CHECK(vgi_space_make(&s, VG_SPACE_GRADIENTS, g, h.body.reference, &e) == VG_EINPUT);
-    CHECK_TEXT(e.message, "the mesh has no faces: only vertices are a space of shapes then");
+    CHECK_TEXT(e.message, "the mesh has no faces: its shape space can only be vertices");
     vg_graph_free(&g);
     FACE(&h, 0, 1, 2);
     FACE(&h, 3, 4, 5);

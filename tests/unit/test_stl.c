@@ -46,7 +46,7 @@ static void leaves_out_what_is_no_triangle(void)
     vg_model_clear(&m);
     text[strlen(text) - strlen(two)] = 0;
     CHECK(read_stl(&m, text, strlen(text), message) == VG_EINPUT);
-    CHECK_TEXT(message, "'x.stl' has no triangle whose three corners are apart");
+    CHECK_TEXT(message, "'x.stl' has no triangle with three different corners");
 }
 
 static void refuses_text_that_breaks_off(void)
@@ -65,7 +65,7 @@ static void refuses_text_that_breaks_off(void)
     static const char word[] =
         "solid\nfacet normal 0 0 1 outer loop vertex 0 0 x vertex 1 0 0 vertex 0 1 0 endloop endfacet endsolid";
     CHECK(read_stl(&m, word, strlen(word), message) == VG_EINPUT);
-    CHECK_TEXT(message, "'x.stl', line 2: 'x' where 'a number' should come");
+    CHECK_TEXT(message, "'x.stl', line 2: 'x' where 'a number' is expected");
     CHECK(read_stl(&m, "solid\nendsolid\n", 15, message) == VG_EINPUT);
     CHECK_TEXT(message, "'x.stl' has no triangles");
 }
@@ -102,7 +102,7 @@ static void reads_binary(void)
         free(tight);
     }
     CHECK(vgi_bytes_append(&b, "", 1, NULL) == VG_OK && read_stl(&m, b.data, b.size, message) == VG_OK);
-    CHECK_TEXT(m.note.text, "left out 1 bytes behind the last triangle");
+    CHECK_TEXT(m.note.text, "left out 1 bytes after the last triangle");
     vg_model_clear(&m);
     b.size--;
     vgi_put32(b.data + 80, UINT32_MAX);

@@ -79,7 +79,7 @@ static void degenerate_faces_go_in_every_format_alike(void)
         {"a.ply", PLY4("2") "4 0 1 2 3\n4 3 1 3 1\n", "0 1 2 3", one},
         /* nothing but such: points */
         {"a.obj", OBJ4 "f 1 1 1\n", "", one},
-        /* a vertex that is not there is no accident */
+        /* a vertex that does not exist is no accident */
         {"a.obj", OBJ4 "f 1 2 2\nf 1 2 9\n", "'a.obj' line 6: vertex 9 is out of range, there are 4", NULL},
         {"a.ply", PLY4("2") "3 0 1 1\n3 0 1 9\n", "'a.ply': face 0 names a vertex twice", NULL},
     };
@@ -142,9 +142,9 @@ static void bad_texture_loses_itself(void)
 {
     static const taken all[] = {
         {"a.obj", OBJ4 "vt 0.1 0.2\nvt nan nan\nvt 0.3 0.4\nf 1/1 2/2 3/3\n", "0 1 2",
-         "left out 1 texture coordinates that are no finite numbers"},
+         "left out 1 texture coordinates that are not finite numbers"},
         {"a.obj", OBJ4 "vt -1.#IND 0\nvt 1 2 3 4\nvt x\nf 1/1 2/2 3/3\n", "0 1 2",
-         "left out 3 texture coordinates that are no finite numbers"},
+         "left out 3 texture coordinates that are not finite numbers"},
         {"a.obj", OBJ4 "f 1/1 2/2 3/3\n", "0 1 2", "3 corners name texture coordinates that are not there"},
         {"a.obj", OBJ4 "vt 0 0\nf 1/-1 2/-2 3/0\n", "0 1 2", "2 corners name texture coordinates that are not there"},
         {"a.obj", OBJ4 "vn nan nan nan\nvn -1.#IND 0 0\nf 1//1 2//2 3//99\n", "0 1 2", ""},
@@ -169,7 +169,7 @@ static void off_is_a_sequence_of_words(void)
         {"a.off", "OFF\n4\n1\n0\n0 0\n0\n1 0 0 1 1 0\n0 1 0\n4\n0\n1\n2\n3\n", "0 1 2 3", ""},
         {"a.off", "OFF\n4 1 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n4 0 1 2 3\n", "0 1 2 3", ""},
         {"a.off", "OFF # a\n4 1 0 # b\n0 0 # c\n0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 # d\n2 3 0.5 0.5 0.5\n", "0 1 2 3", ""},
-        {"a.off", OFF4("1") "4 0 1 2 3\n3 0 1 2\n", "0 1 2 3", "left out what stands behind the last face, from line 8 on"},
+        {"a.off", OFF4("1") "4 0 1 2 3\n3 0 1 2\n", "0 1 2 3", "left out data after the last face, from line 8 on"},
         {"a.off", "OFF\n2 0 0\n0 0 0\n1 -1.#IND 0\n", "'a.off' line 4: a finite number expected, not '-1.#IND'", NULL},
         {"a.off", "OFF\n2 0 0\n0 0 0\n1 1.#INF 0\n", "'a.off' line 4: a finite number expected, not '1.#INF'", NULL},
     };
@@ -194,13 +194,13 @@ static void ply_takes_strips_counts_and_old_headers(void)
         {"a.ply", PLY_HEAD("5") "element face 1\nproperty list double ushort vertex_index\nend_header\n" FIVE
                   "4 0 1 2 3\n", "0 1 2 3", ""},
         {"a.ply", PLY_HEAD("5") "element face 1\nproperty list float int vertex_index\nend_header\n" FIVE "3.5 0 1 2\n",
-         "'a.ply': a number in face 0 should be whole and is 3.5", NULL},
+         "'a.ply': a number in face 0 should be an integer but is 3.5", NULL},
         {"a.ply", "ply\nformat ascii 1.0\ncomment Created by Blender3D 2.42, source file: a\nb.blend\n"
                   "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
                   "property list uchar uint vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "0 1 2",
-         "left out 1 lines of the PLY header that mean nothing"},
+         "left out 1 meaningless lines of the PLY header"},
         {"a.ply", PLY_HEAD("3") "element face 0\nproperty list uchar int vertex_indices\nend_header\n"
-                  "\xef\xbb\xbf" "0 0 0\n1 0 0\n0 1 0\nmore\n", "", "left out 5 bytes behind the last element"},
+                  "\xef\xbb\xbf" "0 0 0\n1 0 0\n0 1 0\nmore\n", "", "left out 5 bytes after the last element"},
     };
     CHECK_ALL(all);
 }
@@ -213,7 +213,7 @@ static void stl_passes_over_what_it_does_not_need(void)
         {"a.stl", "solid x\nfacet normal 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
                   "endsolid\n", "0 1 2", ""},
         {"a.stl", "solid x\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 1.#INF\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n",
-         "'a.stl', line 5: '1.#INF' where 'a number' should come", NULL},
+         "'a.stl', line 5: '1.#INF' where 'a number' is expected", NULL},
     };
     CHECK_ALL(all);
 }

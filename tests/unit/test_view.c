@@ -866,6 +866,6 @@ TESTS({"cube covers its area", cube_covers_its_area}, {"views show their side", 
       {"contours are where fronts end", contours_are_where_fronts_end},
       {"every character has its own shape", every_character_has_its_own_shape},
       {"text outside of the canvas is cut off", text_outside_of_the_canvas_is_cut_off},
-      {"text that is no UTF-8 is drawn", text_that_is_no_utf8_is_drawn},
+      {"text that is not UTF-8 is drawn", text_that_is_no_utf8_is_drawn},
       {"long names lose their middle", long_names_lose_their_middle},
       {"text is as wide as its parts", text_is_as_wide_as_its_parts})

@@ -18,10 +18,10 @@ static const double REACH = 1.2; /* radius, in face sizes or distances from the 
 
 /* ---- choice of faces ---- */
 
-typedef struct carried { /* of one face of the target */
+typedef struct bound_face { /* of one face of the target */
     uint32_t n, face[AROUND];
     double weight[AROUND], distance;
-} carried;
+} bound_face;
 
 typedef struct binding {
     const vg_mesh *source, *target;
@@ -29,7 +29,7 @@ typedef struct binding {
     vgi_surface *surface;
     vgi_incidence around; /* of the source mesh */
     const bool *take;
-    carried *by; /* per target face */
+    bound_face *by; /* per target face */
 } binding;
 
 static void centre_of(const vg_mesh *m, const double *points, size_t f, double centre[3])
@@ -46,7 +46,7 @@ static double radius_of(const vg_mesh *m, const double *points, size_t f, const 
     return sqrt(square);
 }
 
-static bool has(const carried *c, uint32_t face)
+static bool has_face(const bound_face *c, uint32_t face)
 {
     for (uint32_t i = 0; i < c->n; i++)
         if (c->face[i] == face) return true;
@@ -54,7 +54,7 @@ static bool has(const carried *c, uint32_t face)
 }
 
 /* Add faces connected over the surface to those chosen so far, so that a hand on a hip does not move the trousers. */
-static void walk(const binding *b, carried *c, const double at[3], double reach)
+static void add_connected(const binding *b, bound_face *c, const double at[3], double reach)
 {
     const vg_mesh *m = b->source;
     const double *centroids = vgi_surface_centroids(b->surface);
@@ -63,12 +63,12 @@ static void walk(const binding *b, carried *c, const double at[3], double reach)
             for (uint32_t j = b->around.first[m->vert[k]]; j < b->around.first[m->vert[k] + 1]; j++) {
                 uint32_t face = b->around.face[j];
                 if (c->n == AROUND) return;
-                if (!b->take[face] || has(c, face) || vgi_square(centroids + 3 * (size_t)face, at) >= reach * reach) continue;
+                if (!b->take[face] || has_face(c, face) || vgi_square(centroids + 3 * (size_t)face, at) >= reach * reach) continue;
                 c->face[c->n++] = face;
             }
 }
 
-static void weigh(const binding *b, carried *c, const double at[3], double reach)
+static void weigh_faces(const binding *b, bound_face *c, const double at[3], double reach)
 {
     const double *centroids = vgi_surface_centroids(b->surface), *sizes = vgi_surface_sizes(b->surface);
     double sum = 0;
@@ -83,7 +83,7 @@ static void weigh(const binding *b, carried *c, const double at[3], double reach
 
 static void bind_face(const binding *b, size_t f)
 {
-    carried *c = &b->by[f];
+    bound_face *c = &b->by[f];
     vgi_hit hit;
     double centre[3], reach;
     centre_of(b->target, b->target_points, f, centre);
@@ -92,8 +92,8 @@ static void bind_face(const binding *b, size_t f)
     reach = fmax(radius_of(b->target, b->target_points, f, centre), vgi_surface_sizes(b->surface)[hit.face]);
     reach = fmax(reach, c->distance) * REACH;
     c->n = 1, c->face[0] = hit.face;
-    walk(b, c, hit.point, reach);
-    weigh(b, c, hit.point, reach);
+    add_connected(b, c, hit.point, reach);
+    weigh_faces(b, c, hit.point, reach);
 }
 
 static void bind_block(void *context, size_t block)
@@ -113,7 +113,7 @@ static int write_pairs(const binding *b, vg_correspondence *c, vg_err *e)
     c->matched = vgi_array(nf, sizeof *c->matched, e);
     if (!c->first || !c->source || !c->weight || !c->distance || !c->matched) return VG_ENOMEM;
     for (size_t f = 0; f < nf; f++) {
-        const carried *by = &b->by[f];
+        const bound_face *by = &b->by[f];
         c->first[f + 1] = c->first[f];
         for (uint32_t i = 0; i < by->n; i++) {
             if (!(by->weight[i] > 0)) continue;
@@ -148,7 +148,8 @@ int vg_bind(vg_correspondence *c, const vg_mesh *source, const double *source_po
                              .target_digest = vg_mesh_digest(target)};
     bool *take = faces_with_area(source, source_points, &areas, e);
     int r = take ? VG_OK : VG_ENOMEM;
-    if (r == VG_OK && !areas) r = vg_fail(e, VG_EINPUT, "no face of the source has an area: nothing can ride on it");
+    if (r == VG_OK && !areas) r = vg_fail(e, VG_EINPUT, "no face of the source has an area: nothing can be bound to "
+                                                        "it");
     if (r == VG_OK && !target->nf) r = vg_fail(e, VG_EINPUT, "the target has no faces");
     b.take = take;
     if (r == VG_OK) r = vgi_surface_of(&b.surface, source, source_points, take, e);
@@ -375,7 +376,7 @@ static int make_weights(vg_rider *rider, const vg_correspondence *c, const vg_me
             for (uint32_t i = c->first[f]; r == VG_OK && i < c->first[f + 1]; i++, n++)
                 rider->by[n] = number[c->source[i]], rider->weight[n] = c->weight[i] / (end - begin);
         }
-        if (n >= UINT32_MAX) r = vg_fail(e, VG_EINPUT, "there are too many faces to ride on");
+        if (n >= UINT32_MAX) r = vg_fail(e, VG_EINPUT, "there are too many faces to bind to");
         rider->first[v + 1] = (uint32_t)n;
     }
     vgi_incidence_clear(&around);

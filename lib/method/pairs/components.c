@@ -44,7 +44,7 @@ static void look_block(void *context, size_t block)
 }
 
 /* Add the components that explain enough to those taken. */
-static int judge(const choice *c, bool *taken, vg_err *e)
+static int judge_components(const choice *c, bool *taken, vg_err *e)
 {
     const vgi_component_choice *in = c->in;
     double *own = vgi_array(in->n, sizeof *own, e), *explained = vgi_array(in->n, sizeof *explained, e);
@@ -78,7 +78,7 @@ int vgi_choose_components(const vgi_component_choice *in, bool *taken, vg_err *e
     if (r == VG_OK) r = vgi_surface_of(&c.riding, in->source, in->rest, side, e);
     if (r == VG_OK) {
         vgi_parallel(in->threads, (in->target->nf + BLOCK - 1) / BLOCK, look_block, &c);
-        r = judge(&c, taken, e);
+        r = judge_components(&c, taken, e);
     }
     vgi_surface_free(&c.fitted);
     vgi_surface_free(&c.riding);

@@ -92,7 +92,7 @@ static double *entry(const vgi_sparse *A, uint32_t a, uint32_t b)
     return &A->value[low];
 }
 
-static int factorize(fit *t, vg_err *e)
+static int factorize_matrix(fit *t, vg_err *e)
 {
     const vgi_smoothness *s = &t->smooth;
     const vgi_sparse *A = &s->matrix;
@@ -342,7 +342,7 @@ static void add_reverse_pulls(fit *t)
     }
 }
 
-static int solve(fit *t, vg_err *e)
+static int solve_round(fit *t, vg_err *e)
 {
     int r = update_maps(t, e);
     if (r < 0) return r;
@@ -453,12 +453,12 @@ static void tell(const fit *t, size_t round, double stiffness)
     t->in->step(t->in->context, &s);
 }
 
-static int run(fit *t, vg_err *e)
+static int run_rounds(fit *t, vg_err *e)
 {
     int r = VG_OK;
     if (t->in->nties) {
-        r = factorize(t, e);
-        for (int i = 0; i < TIED_SOLVES && r == VG_OK; i++) r = solve(t, e);
+        r = factorize_matrix(t, e);
+        for (int i = 0; i < TIED_SOLVES && r == VG_OK; i++) r = solve_round(t, e);
     }
     for (int round = 0; round < ROUNDS && r == VG_OK; round++) {
         double progress = round / (double)(ROUNDS - 1), first = FIRST_SPAN / t->edge;
@@ -468,8 +468,8 @@ static int run(fit *t, vg_err *e)
         for (int i = 0; i < SOLVES && r == VG_OK; i++) {
             follow_target(t, weight, i == 0);
             if (i == 0) r = follow_reverse(t, weight * progress * progress, e);
-            if (i == 0 && r == VG_OK) r = factorize(t, e);
-            if (r == VG_OK) r = solve(t, e);
+            if (i == 0 && r == VG_OK) r = factorize_matrix(t, e);
+            if (r == VG_OK) r = solve_round(t, e);
         }
         tell(t, (size_t)round + 1, 1 / weight);
     }
@@ -490,7 +490,7 @@ static void measure_edges(fit *t)
     t->stretch = t->edge / STRETCH * t->edge / STRETCH;
 }
 
-static int prepare(fit *t, vg_err *e)
+static int prepare_fit(fit *t, vg_err *e)
 {
     const vg_mesh *m = t->m;
     size_t nv = m->nv, nf = m->nf;
@@ -528,7 +528,7 @@ static int prepare(fit *t, vg_err *e)
     return make_smoother(t, e);
 }
 
-static void clear(fit *t)
+static void clear_fit(fit *t)
 {
     double *arrays[] = {t->laplacian, t->inverse, t->h_normal, t->area, t->trust, t->face_map,
                         t->map, t->x, t->rhs, t->normal, t->tmp, t->pull, t->goal,
@@ -547,9 +547,9 @@ static void clear(fit *t)
 int vgi_fit(const vgi_fitting *in, double *x, vg_err *e)
 {
     fit t = {.in = in, .m = in->source};
-    int r = prepare(&t, e);
-    if (r == VG_OK) r = run(&t, e);
+    int r = prepare_fit(&t, e);
+    if (r == VG_OK) r = run_rounds(&t, e);
     if (r == VG_OK) memcpy(x, t.x, 3 * t.m->nv * sizeof *x);
-    clear(&t);
+    clear_fit(&t);
     return r;
 }

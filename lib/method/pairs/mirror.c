@@ -212,7 +212,7 @@ static int take_pairs(search *s, const vg_markers *pairs, vg_err *e)
 
 /* ---- quality of the pairs ---- */
 
-static void measure(search *s)
+static void measure_pairs(search *s)
 {
     vg_mirror *m = s->m;
     for (size_t v = 0; v < m->nv; v++) {
@@ -261,7 +261,7 @@ int vg_mirror_find(vg_mirror *m, const vg_mesh *mesh, const double *points, size
     if (!m->partner) return VG_ENOMEM;
     memset(m->partner, 0xff, mesh->nv * sizeof *m->partner);
     int r = pairs ? take_pairs(&s, pairs, e) : search_partners(&s, mesh, e);
-    if (r == VG_OK) measure(&s), r = count_broken(m, mesh, e);
+    if (r == VG_OK) measure_pairs(&s), r = count_broken(m, mesh, e);
     if (r < 0) vg_mirror_clear(m);
     return r;
 }

@@ -52,7 +52,7 @@ static const double *centroid(const vgi_surface *s, size_t f)
 }
 
 /* A face without a normal matches every normal. */
-static bool agree(const struct pairing *p, size_t target, size_t source)
+static bool normals_agree(const struct pairing *p, size_t target, size_t source)
 {
     const double *a = vgi_surface_normals(p->in->target_surface) + 3 * target;
     const double *b = vgi_surface_normals(p->in->source_surface) + 3 * source;
@@ -137,7 +137,7 @@ static void find_drivers(const struct pairing *p, size_t g, uint32_t first, stru
     else w.n = 0;
     for (size_t i = 0; i < w.n; i++) {
         double weight = kernel(vgi_square(centroid(p->in->source_surface, w.face[i]), at), radius);
-        if (weight > 1e-3 && (w.face[i] == first || agree(p, g, w.face[i])))
+        if (weight > 1e-3 && (w.face[i] == first || normals_agree(p, g, w.face[i])))
             found[n++] = (struct candidate){w.face[i], weight};
     }
     if (n == 0) found[n++] = (struct candidate){first, 1};
@@ -256,7 +256,7 @@ static void fill_holes(struct pairing *p, uint32_t *queue)
 }
 
 /* Add the drivers of the host, scaled by a share, to d; equal sources are merged. */
-static void borrow(struct drivers *d, const struct drivers *host)
+static void borrow_drivers(struct drivers *d, const struct drivers *host)
 {
     double sum = 0;
     for (uint32_t i = 0; i < host->n; i++) sum += host->at[i].weight;
@@ -275,7 +275,7 @@ static void find_hosts(const struct pairing *p, const vgi_kdtree *tree, const ui
     vgi_near near[HOSTS];
     size_t hosts = vgi_kdtree_nearest(tree, at, INFINITY, HOSTS, near);
     struct drivers d = {.n = 0};
-    for (size_t i = 0; i < hosts; i++) borrow(&d, &p->drivers[matched[near[i].index]]);
+    for (size_t i = 0; i < hosts; i++) borrow_drivers(&d, &p->drivers[matched[near[i].index]]);
     qsort(d.at, d.n, sizeof *d.at, by_weight);
     *out = d;
 }
@@ -409,7 +409,7 @@ static int match(struct pairing *p, vg_err *e)
         for (uint32_t i = 0; i < p->drivers[g].n; i++) p->used[p->drivers[g].at[i].face] = true;
     }
     if (r == VG_OK && matched == 0)
-        r = vg_fail(e, VG_EINPUT, "no face of the target comes near a face of the source that looks the same way");
+        r = vg_fail(e, VG_EINPUT, "no face of the target is near a source face with a similar normal");
     if (r == VG_OK) {
         vgi_parallel(p->in->threads, (p->in->source->nf + BLOCK - 1) / BLOCK, give_block, p);
         fill_holes(p, queue);

@@ -320,7 +320,7 @@ static int normalise(struct registration *g, vg_err *e)
     return VG_OK;
 }
 
-static int align(struct registration *g, vg_err *e)
+static int align_meshes(struct registration *g, vg_err *e)
 {
     g->s = (struct similarity){1, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
     int r = VG_OK;
@@ -333,7 +333,7 @@ static int align(struct registration *g, vg_err *e)
         }
         if (r == VG_OK && (g->nties < 3 || !spread_out(from, g->nties) || !spread_out(to, g->nties)))
             r = vg_fail(e, VG_EINPUT,
-                         "%zu pairs do not say how the meshes lie: give at least three that are not in line",
+                         "%zu pairs do not determine the alignment: give at least three that are not collinear",
                          g->nties);
         if (r == VG_OK) r = robust_similarity(&g->s, from, to, g->nties, e);
         free(from);
@@ -365,7 +365,7 @@ static void find_sides(struct registration *g)
     free(tied);
 }
 
-static int bend(struct registration *g, void (*step)(void *, const vg_register_step *), void *context, vg_err *e)
+static int fit_source(struct registration *g, void (*step)(void *, const vg_register_step *), void *context, vg_err *e)
 {
     const vgi_fitting f = {.source = g->in->source,
                            .rest = g->rest,
@@ -433,10 +433,10 @@ static size_t count_taken(const vg_register_result *out)
 }
 
 /* Fit the components that take part; if other components explain part of the target, fit again with them. */
-static int bend_components(struct registration *g, void (*step)(void *, const vg_register_step *), void *context,
+static int fit_components(struct registration *g, void (*step)(void *, const vg_register_step *), void *context,
                            vg_err *e)
 {
-    int r = bend(g, step, context, e);
+    int r = fit_source(g, step, context, e);
     size_t before = count_taken(g->out);
     if (r < 0 || before == g->out->components || g->in->ncomponents) return r;
     const vgi_component_choice c = {.source = g->in->source, .target = g->in->target, .points = g->x,
@@ -446,7 +446,7 @@ static int bend_components(struct registration *g, void (*step)(void *, const vg
     r = vgi_choose_components(&c, g->out->taken, e);
     if (r < 0 || count_taken(g->out) == before) return r;
     spread_choice(g);
-    return bend(g, step, context, e);
+    return fit_source(g, step, context, e);
 }
 
 static int pair_faces(struct registration *g, vg_err *e)
@@ -477,7 +477,7 @@ static int hand_over(struct registration *g, vg_err *e)
     return VG_OK;
 }
 
-static void clear(struct registration *g)
+static void clear_registration(struct registration *g)
 {
     free(g->source);
     free(g->target);
@@ -538,18 +538,18 @@ int vg_register(vg_register_result *out, const vg_register_input *in,
     int r = check_input(in, e);
     if (r == VG_OK) r = normalise(&g, e);
     if (r == VG_OK) r = make_ties(&g, e);
-    if (r == VG_OK) r = align(&g, e);
+    if (r == VG_OK) r = align_meshes(&g, e);
     if (r == VG_OK) r = judge_markers(&g, e);
     if (r == VG_OK) r = vg_link_components(in->source, g.rest, &g.links, &g.nlinks, e);
     if (r == VG_OK) r = vgi_surface_new(&g.target_surface, in->target, g.target, e);
     if (r == VG_OK) r = vgi_surface_new(&g.source_surface, in->source, g.rest, e);
     if (r == VG_OK) find_sides(&g);
     if (r == VG_OK) r = begin_components(&g, e);
-    if (r == VG_OK) r = bend_components(&g, step, context, e);
+    if (r == VG_OK) r = fit_components(&g, step, context, e);
     if (r == VG_OK) r = vgi_surface_of(&g.fitted_surface, in->source, g.x, g.take, e);
     if (r == VG_OK) r = pair_faces(&g, e);
     if (r == VG_OK) r = hand_over(&g, e);
-    clear(&g);
+    clear_registration(&g);
     if (r < 0) vg_register_result_clear(out);
     return r;
 }

@@ -124,7 +124,7 @@ static void fill_column(const vgi_laplacian *L, size_t j, double *bend, double *
     }
 }
 
-static int fill(vgi_smoothness *s, const vgi_laplacian *L, vg_err *e)
+static int fill_matrices(vgi_smoothness *s, const vgi_laplacian *L, vg_err *e)
 {
     const vgi_sparse *A = &s->matrix;
     double *bend = vgi_array(L->nv, sizeof *bend, e), *stretch = vgi_array(L->nv, sizeof *stretch, e);
@@ -149,7 +149,7 @@ int vgi_smoothness_make(vgi_smoothness *s, const vgi_laplacian *L, vg_err *e)
 {
     *s = (vgi_smoothness){0};
     int r = make_pattern(s, L, e);
-    if (r == VG_OK) r = fill(s, L, e);
+    if (r == VG_OK) r = fill_matrices(s, L, e);
     if (r < 0) vgi_smoothness_clear(s);
     return r;
 }

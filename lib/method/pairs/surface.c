@@ -121,7 +121,7 @@ struct key {
     uint32_t index;
 };
 
-static inline bool before(const struct key *a, const struct key *b, int axis)
+static inline bool key_before(const struct key *a, const struct key *b, int axis)
 {
     return a->middle[axis] < b->middle[axis] || (a->middle[axis] == b->middle[axis] && a->index < b->index);
 }
@@ -135,8 +135,8 @@ static void select_rank(struct key *p, size_t n, size_t middle, int axis)
         struct key pivot = p[begin + vgi_random_below(&random, end - begin)];
         size_t i = begin, j = end - 1;
         for (;;) {
-            while (before(&p[i], &pivot, axis)) i++;
-            while (before(&pivot, &p[j], axis)) j--;
+            while (key_before(&p[i], &pivot, axis)) i++;
+            while (key_before(&pivot, &p[j], axis)) j--;
             if (i >= j) break;
             struct key swap = p[i];
             p[i++] = p[j], p[j--] = swap;
@@ -180,7 +180,7 @@ static void sort_keys(struct key *key, size_t n, int deepest)
         }
 }
 
-static void widen(struct box *box, const double least[3], const double most[3])
+static void widen_box(struct box *box, const double least[3], const double most[3])
 {
     for (int k = 0; k < 3; k++) {
         if (least[k] < box->least[k]) box->least[k] = least[k];
@@ -195,8 +195,8 @@ static void make_boxes(vgi_surface *s)
         struct box *box = &s->box[i];
         for (int k = 0; k < 3; k++) box->least[k] = INFINITY, box->most[k] = -INFINITY;
         if (i < leaves) {
-            widen(box, s->box[2 * i].least, s->box[2 * i].most);
-            widen(box, s->box[2 * i + 1].least, s->box[2 * i + 1].most);
+            widen_box(box, s->box[2 * i].least, s->box[2 * i].most);
+            widen_box(box, s->box[2 * i + 1].least, s->box[2 * i + 1].most);
             continue;
         }
         size_t begin, end;
@@ -205,9 +205,9 @@ static void make_boxes(vgi_surface *s)
             const struct triangle *t = &s->triangle[j];
             double b[3], c[3];
             vgi_sum(t->a, t->ab, b), vgi_sum(t->a, t->ac, c);
-            widen(box, t->a, t->a);
-            widen(box, b, b);
-            widen(box, c, c);
+            widen_box(box, t->a, t->a);
+            widen_box(box, b, b);
+            widen_box(box, c, c);
         }
     }
 }
@@ -376,7 +376,7 @@ static const double *corner_normal(const vgi_surface *s, uint32_t corner)
 
 /* Whether the normal fits. On sharp edges and tips the vertex normals are tested too, because normals of the adjacent
  * faces do not represent the surface there. */
-static bool fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal,
+static bool normal_fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal,
                  double cosine)
 {
     const double *n = s->normal + 3 * (size_t)t->face;
@@ -399,7 +399,7 @@ static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const doubl
         double u[2] = {0, 0};
         uint8_t touched;
         double square = triangle_distance(t, p, u, &touched);
-        if (!(square <= *best) || (!(square < *best) && t->face >= hit->face) || !fits(s, t, u, normal, cosine))
+        if (!(square <= *best) || (!(square < *best) && t->face >= hit->face) || !normal_fits(s, t, u, normal, cosine))
             continue;
         *best = square;
         *hit = (vgi_hit){.face = t->face, .square = square, .border = touched & t->borders,

@@ -287,15 +287,15 @@ vg_deform_stats vg_cross_transfer_get_stats(const vg_cross_transfer *c)
 
 /* ---- eight poses ---- */
 
-typedef struct carry_job {
+typedef struct transfer_job {
     vg_cross_transfer *c;
     const double *poses[VGI_LANES];
     double *const *out;
     size_t lanes;
-} carry_job;
+} transfer_job;
 
 /* Map of a line segment: its smallest rotation and its stretch, lane by lane. */
-static void measure_segment(const carry_job *j, size_t f)
+static void measure_segment(const transfer_job *j, size_t f)
 {
     const vg_cross_transfer *c = j->c;
     const uint32_t *vert = c->source->vert + c->source->start[f];
@@ -317,7 +317,7 @@ static void measure_segment(const carry_job *j, size_t f)
 
 static void measure_chunk(void *context, size_t i)
 {
-    carry_job *j = context;
+    transfer_job *j = context;
     vg_cross_transfer *c = j->c;
     size_t nf = c->source->nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
     const vgi_source s = {c->source->start, c->source->vert, c->p, c->q, c->slow, j->poses};
@@ -363,7 +363,7 @@ static void centre_beside(const vg_cross_transfer *c, uint32_t v, const double *
 
 /* A link also follows the relative motion of the source's faces at its ends, beyond their common map: eyes move in
  * their sockets. Scaled to the target's size. */
-static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
+static void add_drift(const transfer_job *j, size_t f, const vgi_map *map)
 {
     const vg_cross_transfer *c = j->c;
     size_t begin = c->target->faces.start[f];
@@ -383,7 +383,7 @@ static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
         }
 }
 
-static void follow(const carry_job *j, size_t f)
+static void follow_face(const transfer_job *j, size_t f)
 {
     static const vgi_follow how[] = {[VG_BY_POSE] = VGI_FOLLOW_POSE, [VG_BY_GRADIENT] = VGI_FOLLOW_GRADIENT,
                                      [VG_BY_BLEND] = VGI_FOLLOW_BLEND};
@@ -412,14 +412,14 @@ static void follow(const carry_job *j, size_t f)
 
 static void follow_chunk(void *context, size_t i)
 {
-    const carry_job *j = context;
+    const transfer_job *j = context;
     size_t nf = j->c->target->faces.nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
     for (size_t f = first; f < last; f++)
-        if (!j->c->is_twin[f]) follow(j, f);
+        if (!j->c->is_twin[f]) follow_face(j, f);
 }
 
 /* Transfer the twins corner by corner, from the order of the twins to that of the target. */
-static void transfer_twins(const carry_job *j)
+static void transfer_twins(const transfer_job *j)
 {
     const vg_cross_transfer *c = j->c;
     if (!c->ntwins) return;
@@ -435,7 +435,7 @@ static void transfer_twins(const carry_job *j)
 void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors)
 {
     for (size_t p = 0; p < n; p += VGI_LANES) {
-        carry_job j = {.c = c, .out = vectors + p, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
+        transfer_job j = {.c = c, .out = vectors + p, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(c->threads, (c->source->nf + CHUNK - 1) / CHUNK, measure_chunk, &j);
         transfer_twins(&j);

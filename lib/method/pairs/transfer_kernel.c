@@ -34,7 +34,7 @@ VGI_INLINE unsigned measure_part(const vgi_source *s, size_t f, size_t part, vgi
     return vgi_bits(~(n2 > 1e-24 * spread * spread)) << part * VGI_WIDTH;
 }
 
-static void measure(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad)
+static void measure_maps(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad)
 {
     for (size_t f = first; f < last; f++) {
         if (s->slow[f]) continue;
@@ -53,7 +53,7 @@ static void add_but(const vgi_map *map, double w, unsigned bad, vgi_map *sum, vg
     }
 }
 
-static void add(const vgi_drivers *d, size_t first, size_t last, vgi_map *sum, vgi_lanes weight)
+static void add_maps(const vgi_drivers *d, size_t first, size_t last, vgi_map *sum, vgi_lanes weight)
 {
     for (size_t i = first; i < last; i++) {
         const vgi_map *map = &d->maps[d->source[i]];
@@ -70,7 +70,7 @@ static void add(const vgi_drivers *d, size_t first, size_t last, vgi_map *sum, v
     }
 }
 
-static void finish(vgi_map *sum, const vgi_lanes weight)
+static void finish_mean(vgi_map *sum, const vgi_lanes weight)
 {
     for (size_t part = 0; part < VGI_PARTS; part++) {
         vgi_wide m[9], w = vgi_load(weight + part * VGI_WIDTH), share = 1.0 / w;
@@ -92,7 +92,7 @@ static void polar(const vgi_map *a, vgi_map *rotation)
     }
 }
 
-VGI_INLINE void apply(const vgi_wide *a, const double *r, vgi_wide d[3])
+VGI_INLINE void apply_map(const vgi_wide *a, const double *r, vgi_wide d[3])
 {
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++)
@@ -102,12 +102,12 @@ VGI_INLINE void apply(const vgi_wide *a, const double *r, vgi_wide d[3])
 /* Transform one vector by the map d and its rotation. */
 VGI_INLINE void follow_vector(const vgi_wide *d, const vgi_wide *turn, vgi_follow how, const double *v, vgi_wide w[3])
 {
-    if (how == VGI_FOLLOW_RIGID) return apply(turn, v, w);
-    apply(d, v, w);
+    if (how == VGI_FOLLOW_RIGID) return apply_map(turn, v, w);
+    apply_map(d, v, w);
     if (how == VGI_FOLLOW_GRADIENT) return;
     double length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
     vgi_wide t[3], stretch = vgi_roots(vgi_wide_dot(w, w) * vgi_same(1 / (length2 > 0 ? length2 : 1)));
-    apply(turn, v, t);
+    apply_map(turn, v, t);
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++) {
         t[i] *= stretch;
@@ -115,7 +115,7 @@ VGI_INLINE void follow_vector(const vgi_wide *d, const vgi_wide *turn, vgi_follo
     }
 }
 
-static void follow(const vgi_map *map, vgi_follow how, const double *vectors, size_t r, double *const *out,
+static void follow_vectors(const vgi_map *map, vgi_follow how, const double *vectors, size_t r, double *const *out,
                    size_t offset, size_t lanes)
 {
     for (size_t part = 0; part * VGI_WIDTH < lanes; part++) {
@@ -129,4 +129,4 @@ static void follow(const vgi_map *map, vgi_follow how, const double *vectors, si
     }
 }
 
-const vgi_transfer_kernel VGI_OF_SET(vgi_transfer_kernel) = {measure, add, finish, polar, follow};
+const vgi_transfer_kernel VGI_OF_SET(vgi_transfer_kernel) = {measure_maps, add_maps, finish_mean, polar, follow_vectors};

@@ -30,43 +30,43 @@ static double cost_of(const vgi_joining *j, uint32_t a, uint32_t b)
 
 /* ---- the heap ---- */
 
-static bool before(const state *s, uint32_t p, uint32_t q)
+static bool pair_before(const state *s, uint32_t p, uint32_t q)
 {
     double a = s->cost[p], b = s->cost[q];
     return a < b || (a == b && p < q);
 }
 
-static void put(state *s, size_t at, uint32_t p)
+static void put_pair(state *s, size_t at, uint32_t p)
 {
     s->heap[at] = p, s->place[p] = (uint32_t)at;
 }
 
 /* Restore the heap order at position `at`. */
-static void settle(state *s, size_t at)
+static void settle_heap(state *s, size_t at)
 {
     uint32_t p = s->heap[at];
-    for (; at > 0 && before(s, p, s->heap[(at - 1) / 2]); at = (at - 1) / 2) put(s, at, s->heap[(at - 1) / 2]);
+    for (; at > 0 && pair_before(s, p, s->heap[(at - 1) / 2]); at = (at - 1) / 2) put_pair(s, at, s->heap[(at - 1) / 2]);
     for (size_t child; (child = 2 * at + 1) < s->left; at = child) {
-        if (child + 1 < s->left && before(s, s->heap[child + 1], s->heap[child])) child++;
-        if (!before(s, s->heap[child], p)) break;
-        put(s, at, s->heap[child]);
+        if (child + 1 < s->left && pair_before(s, s->heap[child + 1], s->heap[child])) child++;
+        if (!pair_before(s, s->heap[child], p)) break;
+        put_pair(s, at, s->heap[child]);
     }
-    put(s, at, p);
+    put_pair(s, at, p);
 }
 
-static void drop(state *s, uint32_t p)
+static void drop_pair(state *s, uint32_t p)
 {
     size_t at = s->place[p];
     uint32_t other = s->heap[--s->left];
     s->place[p] = NONE;
     if (other == p) return;
-    put(s, at, other);
-    settle(s, at);
+    put_pair(s, at, other);
+    settle_heap(s, at);
 }
 
 /* ---- pieces ---- */
 
-static void append(state *s, uint32_t piece, uint32_t end)
+static void append_pair(state *s, uint32_t piece, uint32_t end)
 {
     if (s->first[piece] == NONE) s->first[piece] = end;
     else s->next[s->last[piece]] = end;
@@ -81,7 +81,7 @@ static uint32_t beyond(const state *s, uint32_t p, uint32_t a)
 }
 
 /* Merge b into a. If two pairs now join the same pieces, the first one stays. */
-static void join(state *s, uint32_t a, uint32_t b)
+static void join_pieces(state *s, uint32_t a, uint32_t b)
 {
     vgi_joining *j = s->j;
     double sum = j->size[a] + j->size[b], *x = j->mean + a * j->width, *y = j->mean + b * j->width;
@@ -97,19 +97,19 @@ static void join(state *s, uint32_t a, uint32_t b)
             if (s->place[p] == NONE) continue;
             uint32_t twin = s->seen[other];
             if (other == a || (twin != NONE && twin < p)) {
-                drop(s, p);
+                drop_pair(s, p);
                 continue;
             }
-            if (twin != NONE) drop(s, twin);
+            if (twin != NONE) drop_pair(s, twin);
             s->seen[other] = p;
-            append(s, a, end);
+            append_pair(s, a, end);
         }
     for (uint32_t end = s->first[a]; end != NONE; end = s->next[end]) {
         uint32_t p = end / 2, other = beyond(s, p, a);
         if (s->place[p] == NONE) continue;
         s->seen[other] = NONE;
         s->cost[p] = cost_of(j, a, other);
-        settle(s, s->place[p]);
+        settle_heap(s, s->place[p]);
     }
 }
 
@@ -128,9 +128,9 @@ static int make_state(state *s, vgi_joining *j, uint32_t *set, vg_err *e)
     memset(s->seen, 0xff, n * sizeof *s->seen);
     for (uint32_t p = 0; p < m; p++) {
         s->cost[p] = cost_of(j, j->pair[p][0], j->pair[p][1]);
-        for (uint32_t k = 0; k < 2; k++) append(s, j->pair[p][k], 2 * p + k);
-        put(s, s->left++, p);
-        settle(s, p);
+        for (uint32_t k = 0; k < 2; k++) append_pair(s, j->pair[p][k], 2 * p + k);
+        put_pair(s, s->left++, p);
+        settle_heap(s, p);
     }
     return VG_OK;
 }
@@ -142,7 +142,7 @@ int vgi_join_pieces(vgi_joining *j, size_t k, uint32_t *set, vg_err *e)
     for (size_t pieces = j->n; r == VG_OK && pieces > k && s.left; pieces--) {
         const uint32_t *best = j->pair[s.heap[0]];
         uint32_t a = vgi_sets_find(set, best[0]), b = vgi_sets_find(set, best[1]);
-        join(&s, a < b ? a : b, a < b ? b : a);
+        join_pieces(&s, a < b ? a : b, a < b ? b : a);
     }
     for (size_t i = 0; r == VG_OK && i < j->n; i++) set[i] = vgi_sets_find(set, (uint32_t)i);
     free(s.cost);

@@ -88,7 +88,7 @@ static void add_chunk(void *context, size_t i)
 }
 
 /* Width of rows: at least `numbers`, at least WIDTH. */
-static int widen(vg_segmenter *s, uint64_t numbers, vg_err *e)
+static int widen_rows(vg_segmenter *s, uint64_t numbers, vg_err *e)
 {
     size_t nf = s->turns.nf, width = s->width, old = s->width, n;
     while (width < numbers && width < WIDTH) width *= 2;
@@ -106,7 +106,7 @@ static int widen(vg_segmenter *s, uint64_t numbers, vg_err *e)
 /* The first entries have a feature of their own; each later entry is added to a random feature with a random sign. */
 int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e)
 {
-    int r = widen(s, 9 * ((uint64_t)s->poses + n), e);
+    int r = widen_rows(s, 9 * ((uint64_t)s->poses + n), e);
     if (r < 0) return r;
     for (size_t p = 0; p < n; p += VGI_LANES * GROUPS) {
         adding a = {.s = s, .poses = poses + p, .n = n - p < VGI_LANES * GROUPS ? n - p : VGI_LANES * GROUPS};
@@ -162,7 +162,7 @@ static size_t chunks(const clustering *c)
     return (c->n + CHUNK - 1) / CHUNK;
 }
 
-static float inner(const float *a, const float *b, size_t n)
+static float inner_product(const float *a, const float *b, size_t n)
 {
     return vgi_segment_kernel_now()->inner(a, b, n);
 }
@@ -173,10 +173,10 @@ static void near_chunk(void *context, size_t i)
 {
     clustering *c = context;
     size_t first = i * CHUNK, last = first + CHUNK < c->n ? first + CHUNK : c->n, width = c->s->width;
-    float square = inner(c->fresh, c->fresh, width);
+    float square = inner_product(c->fresh, c->fresh, width);
     double sum = 0;
     for (size_t f = first; f < last; f++) {
-        float d = c->norm[f] + square - 2 * inner(c->s->feature + f * width, c->fresh, width);
+        float d = c->norm[f] + square - 2 * inner_product(c->s->feature + f * width, c->fresh, width);
         if (!(d > 1e-6f * (c->norm[f] + square))) d = 0; /* a smaller distance is rounding error */
         if (d < c->nearest[f]) c->nearest[f] = d, c->label[f] = c->fresh_label;
         sum += (double)c->nearest[f];
@@ -192,7 +192,7 @@ static double add_up(const clustering *c)
 }
 
 /* The face at which the cumulative sum of squared distances exceeds `at`. */
-static size_t draw(const clustering *c, double at)
+static size_t draw_face(const clustering *c, double at)
 {
     size_t i = 0, last = 0;
     while (i + 1 < chunks(c) && at >= c->sums[i]) at -= c->sums[i++];
@@ -220,7 +220,7 @@ static void seed_centres(clustering *c, size_t k, uint64_t seed)
     while (c->k < k) {
         double sum = add_up(c), share = (double)(vgi_random_mix(seed ^ vgi_random_mix(c->k)) >> 11) * 0x1p-53;
         if (!(sum > 0)) break; /* every face equals one of the centres */
-        size_t face = draw(c, share * sum);
+        size_t face = draw_face(c, share * sum);
         if (!(c->nearest[face] > 0)) break;
         add_centre(c, face);
     }
@@ -315,7 +315,7 @@ static size_t iterate(clustering *c, double *objective)
         fill_empty(c);
         find_means(c);
         for (size_t k = 0; k < c->k; k++)
-            c->centre_norm[k] = inner(c->centre + k * c->s->width, c->centre + k * c->s->width, c->s->width);
+            c->centre_norm[k] = inner_product(c->centre + k * c->s->width, c->centre + k * c->s->width, c->s->width);
         vgi_blas_alone();
         atomic_store(&c->next, 0);
         vgi_parallel(c->s->threads, c->workers, assign_chunks, c);
@@ -378,7 +378,7 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
     forget_means(c);
     for (size_t f = 0; f < n; f++) {
         const float *x = s->feature + f * s->width;
-        c->norm[f] = inner(x, x, s->width), c->nearest[f] = INFINITY;
+        c->norm[f] = inner_product(x, x, s->width), c->nearest[f] = INFINITY;
     }
     return VG_OK;
 }
@@ -421,7 +421,7 @@ static int connect(const vg_segmenter *s, uint32_t *label, size_t nlabels, size_
 }
 
 /* Number patches by their first faces. */
-static int renumber(uint32_t *label, size_t nf, size_t *k, vg_err *e)
+static int renumber_patches(uint32_t *label, size_t nf, size_t *k, vg_err *e)
 {
     uint32_t *number = vgi_array_raw(*k, sizeof *number, e);
     if (!number) return VG_ENOMEM;
@@ -446,13 +446,13 @@ static double objective_of(clustering *c, size_t k)
     double sum = 0;
     for (size_t f = 0; f < c->n; f++) {
         const float *m = c->centre + c->label[f] * c->s->width, *x = c->s->feature + f * c->s->width;
-        double d = (double)c->norm[f] + (double)inner(m, m, c->s->width) - 2 * (double)inner(x, m, c->s->width);
+        double d = (double)c->norm[f] + (double)inner_product(m, m, c->s->width) - 2 * (double)inner_product(x, m, c->s->width);
         sum += d > 0 ? d : 0;
     }
     return sum;
 }
 
-static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segment_stats *report, vg_err *e)
+static int cut_patches(clustering *c, size_t k, uint64_t seed, bool connected, vg_segment_stats *report, vg_err *e)
 {
     double objective = 0;
     int r = VG_OK;
@@ -471,7 +471,7 @@ static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segmen
         }
         n = pieces;
     }
-    if (r == VG_OK) r = renumber(c->label, c->n, &n, e);
+    if (r == VG_OK) r = renumber_patches(c->label, c->n, &n, e);
     if (r < 0) return r;
     report->patches = n;
     report->angle = angle_of(c, connected ? objective_of(c, n) : objective);
@@ -492,7 +492,7 @@ int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connec
         if (k > s->turns.nf) k = s->turns.nf;
         int r = make_clustering(&c, s, k, e);
         if (r < 0) return r;
-        r = cut(&c, k, seed, connected, report, e);
+        r = cut_patches(&c, k, seed, connected, report, e);
         bool done = patches || report->angle <= enough || i + 1 == nsteps || k == s->turns.nf;
         if (r == VG_OK && done) {
             out->n = report->patches, out->of_face = c.label;

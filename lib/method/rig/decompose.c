@@ -166,7 +166,7 @@ static void drop_empty(dividing *d)
 }
 
 /* Fit motions and assign vertices alternately. */
-static int settle(dividing *d, vg_err *e)
+static int settle_clusters(dividing *d, vg_err *e)
 {
     int r = VG_OK;
     for (int i = 0; r == VG_OK && i < LLOYD; i++) {
@@ -319,11 +319,11 @@ static int divide_all(dividing *d, size_t wanted, vg_err *e)
     size_t most = most_clusters(wanted, d->l->nv);
     d->n = 1;
     for (size_t v = 0; v < d->l->nv; v++) d->l->rig.skin_weight[VG_SKIN * v] = 1;
-    int r = settle(d, e);
-    while (r == VG_OK && d->n < most && divide_some(d, most)) r = settle(d, e);
+    int r = settle_clusters(d, e);
+    while (r == VG_OK && d->n < most && divide_some(d, most)) r = settle_clusters(d, e);
     if (r == VG_OK && d->n > wanted) {
         r = merge(d, wanted, e);
-        if (r == VG_OK) r = settle(d, e);
+        if (r == VG_OK) r = settle_clusters(d, e);
     }
     return r;
 }

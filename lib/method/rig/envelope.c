@@ -255,7 +255,7 @@ typedef struct choosing {
     size_t n;
 } choosing;
 
-static void hold(choosing *x, size_t v)
+static void hold_vertex(choosing *x, size_t v)
 {
     const double *p = x->f->h->body.reference, *at = p + 3 * v;
     x->list[x->n++] = (uint32_t)v;
@@ -283,7 +283,7 @@ static int hold_groups(choosing *x, vg_err *e)
         if (!*to || x->doubt[v] < x->doubt[*to - 1]) *to = (uint32_t)v + 1;
     }
     for (size_t i = 0; r == VG_OK && i < slots && x->n < MOST_HELD; i++)
-        if (best[i]) hold(x, best[i] - 1);
+        if (best[i]) hold_vertex(x, best[i] - 1);
     free(label);
     free(best);
     return r;
@@ -313,7 +313,7 @@ static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
             if (value > most) most = value, best = v;
         }
         if (best == nv) break;
-        hold(&x, best);
+        hold_vertex(&x, best);
     }
     if (r == VG_OK) {
         qsort(x.list, x.n, sizeof *x.list, vgi_by_index);
@@ -349,7 +349,7 @@ static double cross_with_reference(const refining *x, size_t i, size_t k, size_t
 }
 
 /* Residual of vertex v, minus the contribution of row z (relative to the joints), along component k of bone i. */
-static double missing(const refining *x, size_t v, const double *z, size_t i, size_t k)
+static double residual_along(const refining *x, size_t v, const double *z, size_t i, size_t k)
 {
     const vgi_rig_sums *s = &x->f->sums;
     const double *p = x->f->h->body.reference + 3 * v, *a = s->at + 3 * i, *o = x->origin;
@@ -395,10 +395,10 @@ static void refine_vertex(const refining *x, size_t v, double *z)
     for (size_t b = 0; b < bones; b++)
         for (size_t k = 0; k < 4; k++)
             if (b || k < 3) bone[unknowns] = b, number[unknowns++] = k;
-    double base = missing(x, v, z, own[0], 3);
+    double base = residual_along(x, v, z, own[0], 3);
     for (size_t i = 0; i < unknowns; i++) {
         size_t a = own[bone[i]], k = number[i];
-        y[i] = missing(x, v, z, a, k) - (k == 3 ? base : 0);
+        y[i] = residual_along(x, v, z, a, k) - (k == 3 ? base : 0);
         for (size_t j = 0; j <= i; j++) {
             size_t c = own[bone[j]], l = number[j];
             double sum = cross_with_reference(x, a, k, c, l);
@@ -430,7 +430,7 @@ static void refine_chunk(void *context, size_t task)
         if (x->f->g->in_face[v]) refine_vertex(x, v, x->space + task * 4 * x->m->n);
 }
 
-static int refine(const vg_rig_fitter *f, vg_map *m, vg_err *e)
+static int refine_envelope(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
     refining x = {.f = f, .m = m, .chunks = m->nv < CHUNK ? 1 : CHUNK};
     if (!(f->o.refine > 0)) return VG_OK;
@@ -493,7 +493,7 @@ int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_rig *rig, vg
         for (size_t v = 0; r == VG_OK && v < m->nv; v++) vgi_map_skin_row(m, &body, v);
     } else if (r == VG_OK) {
         r = f->base.n ? vg_map_copy(m, &f->base, e) : make_base(f, m, e);
-        if (r == VG_OK) r = refine(f, m, e);
+        if (r == VG_OK) r = refine_envelope(f, m, e);
     }
     if (r == VG_OK) r = vg_rig_copy(rig, &f->rig, f->g->faces.nv, e);
     if (r < 0) vg_map_clear(m);

@@ -101,7 +101,7 @@ static double height(const feet *f, const double point[3])
     return f->sign * point[f->up];
 }
 
-static int prepare(feet *f, vg_err *e)
+static int prepare_feet(feet *f, vg_err *e)
 {
     vgi_role *roles = vgi_array(f->r->skeleton.njoints, sizeof *roles, e);
     int r = roles ? vgi_joint_roles(&f->r->skeleton, roles, e) : VG_ENOMEM;
@@ -319,7 +319,7 @@ static void move_pose(const feet *f, size_t p)
 int vg_feet_hold(const vg_rig *g, size_t n, double *const *transforms, vg_err *e)
 {
     feet f = {.r = g, .n = n, .transforms = transforms};
-    int r = prepare(&f, e);
+    int r = prepare_feet(&f, e);
     for (size_t i = 0; r == VG_OK && i < f.nlegs; i++) {
         hold_joint(&f, &f.legs[i], f.legs[i].toe);
         hold_joint(&f, &f.legs[i], f.legs[i].foot);

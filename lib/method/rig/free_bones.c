@@ -101,7 +101,7 @@ void vg_free_bones_free(vg_free_bones **out)
 /* ---- one pose ---- */
 
 /* B of a pose relative to its centroid. */
-static void load(const vg_free_bones *x, const double *pose, const double centre[3], working *w)
+static void load_pose(const vg_free_bones *x, const double *pose, const double centre[3], working *w)
 {
     size_t width = 4 * x->n;
     memset(w->b, 0, 3 * width * sizeof *w->b);
@@ -129,7 +129,7 @@ static void place_bone(const double *g, size_t stride, const double m[12], doubl
 }
 
 /* Fit each bone alone, as if no other bone moved its vertices. A bone without vertices follows the whole body. */
-static void start(const vg_free_bones *x, working *w)
+static void start_alone(const vg_free_bones *x, working *w)
 {
     size_t width = 4 * x->n;
     for (size_t j = 0; j < x->n; j++) {
@@ -208,9 +208,9 @@ static void fit_pose(void *context, size_t k)
     working w = working_at(x, k);
     double centre[3], most = 1;
     vg_centroid(f->poses[k], x->nv, centre);
-    load(x, f->poses[k], centre, &w);
+    load_pose(x, f->poses[k], centre, &w);
     if (f->begun) continue_from(x, f->transforms[k], centre, &w);
-    else start(x, &w);
+    else start_alone(x, &w);
     find_left(x, &w);
     for (int sweep = 0; sweep < SWEEPS && most > still; sweep++) {
         most = 0;

@@ -234,7 +234,7 @@ void vg_inverse_skin_free(vg_inverse_skin **out)
 
 /* B of a pose relative to its centroid, 3 x 3 per bone: first from its own vertices, then including its
  * descendants. */
-static void load(const vg_inverse_skin *x, const double *pose, const double centre[3], working *w)
+static void load_pose(const vg_inverse_skin *x, const double *pose, const double centre[3], working *w)
 {
     size_t n = x->n;
     memset(w->b, 0, 9 * n * sizeof *w->b);
@@ -328,7 +328,7 @@ static void add_priors(const vg_inverse_skin *x, const double *r, double prior, 
     }
 }
 
-static void sweep(const vg_inverse_skin *x, working *w, double prior)
+static void sweep_bones(const vg_inverse_skin *x, working *w, double prior)
 {
     for (size_t j = 0; j < x->n; j++) {
         double m[9];
@@ -402,7 +402,7 @@ static double turn_bones(const vg_inverse_skin *x, working *w)
     return most;
 }
 
-static void descend(const vg_inverse_skin *x, working *w, double prior)
+static void descend_pose(const vg_inverse_skin *x, working *w, double prior)
 {
     static const double noise = 1e-16; /* relative rounding error of the objective */
     double damping = 1e-6, f = objective(x, w, w->r, prior), turn = 1;
@@ -444,7 +444,7 @@ typedef struct fitting {
 
 /* Start with each bone alone, about the centroid of its own vertices. A bone without vertices takes its parent's
  * rotation. */
-static void start(const vg_inverse_skin *x, working *w, size_t j)
+static void start_alone(const vg_inverse_skin *x, working *w, size_t j)
 {
     const double *own = x->own + 4 * j, *sum = w->sum + 3 * j;
     double m[9];
@@ -465,17 +465,17 @@ static void fit_pose(void *context, size_t k)
     working w = working_at(x, k);
     double centre[3], root[3];
     vg_centroid(f->poses[k], x->nv, centre);
-    load(x, f->poses[k], centre, &w);
+    load_pose(x, f->poses[k], centre, &w);
     if (f->begun) {
         memcpy(w.r, f->rotations + 9 * x->n * k, 9 * x->n * sizeof *w.r);
         carry(x, &w);
     } else {
-        for (size_t j = 0; j < x->n; j++) start(x, &w, j);
+        for (size_t j = 0; j < x->n; j++) start_alone(x, &w, j);
         carry(x, &w);
-        for (int i = 0; i < SWEEPS; i++) sweep(x, &w, FIRST_PRIOR);
-        descend(x, &w, FIRST_PRIOR);
+        for (int i = 0; i < SWEEPS; i++) sweep_bones(x, &w, FIRST_PRIOR);
+        descend_pose(x, &w, FIRST_PRIOR);
     }
-    descend(x, &w, LAST_PRIOR);
+    descend_pose(x, &w, LAST_PRIOR);
     if (f->rotations) memcpy(f->rotations + 9 * x->n * k, w.r, 9 * x->n * sizeof *w.r);
     for (size_t j = 1; j < x->n; j++)
         if (!x->carries[j]) memcpy(w.r + 9 * j, w.r + 9 * (size_t)x->parent[j], 9 * sizeof *w.r);
@@ -535,7 +535,7 @@ static int find_motions(vgi_learning *l, void *context, bool begun, vg_err *e)
 }
 
 /* First approximately on a subset of the vertices, then exactly on all of them. */
-static int learn(vgi_learning *l, const vg_rig *rig, size_t nv, const double *reference, size_t n,
+static int learn_skin(vgi_learning *l, const vg_rig *rig, size_t nv, const double *reference, size_t n,
                  const double *const *poses, double *rotations, double *miss, vg_err *e)
 {
     enum { SOME = 4096 };
@@ -563,7 +563,7 @@ int vg_rig_learn(vg_rig *rig, size_t nv, const double *reference, size_t n, cons
     for (size_t i = 0; r == VG_OK && i < n; i++) l.transforms[i] = space + 7 * bones * i;
     for (size_t b = 0; r == VG_OK && b < bones; b++)
         memcpy(l.at + 3 * b, rig->at + 3 * (size_t)rig->bone[b], 3 * sizeof *l.at);
-    if (r == VG_OK) r = learn(&l, rig, nv, reference, n, poses, rotations, miss, e);
+    if (r == VG_OK) r = learn_skin(&l, rig, nv, reference, n, poses, rotations, miss, e);
     if (r == VG_OK) vgi_learning_keep(&l, rig);
     vgi_learning_clear(&l);
     free(space);

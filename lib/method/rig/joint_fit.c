@@ -60,7 +60,7 @@ static void ask_vertices(void *context, size_t task)
 }
 
 /* Median, per coordinate, of the better half of the vertices. */
-static void agree(const locating *x, double *list, double shift[3], double *spread)
+static void median_shift(const locating *x, double *list, double shift[3], double *spread)
 {
     size_t n = 0;
     memcpy(list, x->spread, x->nv * sizeof *list);
@@ -100,7 +100,7 @@ int vg_rig_locate(const vg_skeleton *s, size_t nv, const double *reference, size
         for (size_t k = 0; k < n; k++)
             for (size_t j = 0; j < joints; j++) vg_quat_matrix(turns[k] + 4 * j, x.turns + 9 * (k * joints + j));
         vgi_parallel(threads, (nv + CHUNK - 1) / CHUNK, ask_vertices, &x);
-        agree(&x, list, shift, spread);
+        median_shift(&x, list, shift, spread);
     }
     free(rest);
     free(turned);

@@ -120,7 +120,7 @@ static vgi_role look_up(const char *name)
 
 /* ---- roles from the tree of joints ---- */
 
-static bool has(const vgi_role *roles, size_t n, vgi_part part, int side)
+static bool has_role(const vgi_role *roles, size_t n, vgi_part part, int side)
 {
     for (size_t j = 0; j < n; j++)
         if (roles[j].part == part && (!side || roles[j].side == side)) return true;
@@ -135,8 +135,8 @@ static void rename_part(vgi_role *roles, size_t n, vgi_part from, vgi_part to, i
 
 static void decide_side(vgi_role *roles, size_t n, int side)
 {
-    bool clavicle = has(roles, n, VGI_CLAVICLE, side), arm = has(roles, n, VGI_UPPER_ARM, side);
-    bool thigh = has(roles, n, VGI_THIGH, side);
+    bool clavicle = has_role(roles, n, VGI_CLAVICLE, side), arm = has_role(roles, n, VGI_UPPER_ARM, side);
+    bool thigh = has_role(roles, n, VGI_THIGH, side);
     vgi_part shoulder = arm ? (clavicle ? VGI_NO_PART : VGI_CLAVICLE) : VGI_UPPER_ARM;
     rename_part(roles, n, VGI_SHOULDER, shoulder, side);
     rename_part(roles, n, VGI_SIDED_HIP, thigh ? VGI_HIP_JOINT : VGI_THIGH, side);
@@ -156,8 +156,8 @@ static void find_above(const vg_skeleton *s, const vgi_role *roles, vgi_part par
 static void divide_spine(const vg_skeleton *s, vgi_role *roles, bool *below)
 {
     size_t n = s->njoints, last = n;
-    if (!has(roles, n, VGI_HIPS, 0)) rename_part(roles, n, VGI_ROOT, VGI_HIPS, 0);
-    if (!has(roles, n, VGI_HIPS, 0)) {
+    if (!has_role(roles, n, VGI_HIPS, 0)) rename_part(roles, n, VGI_ROOT, VGI_HIPS, 0);
+    if (!has_role(roles, n, VGI_HIPS, 0)) {
         find_above(s, roles, VGI_THIGH, below);
         for (size_t j = 0; j < n; j++)
             if (roles[j].part == VGI_SPINE && below[j]) {
@@ -166,11 +166,11 @@ static void divide_spine(const vg_skeleton *s, vgi_role *roles, bool *below)
             }
         memset(below, 0, n * sizeof *below);
     }
-    if (has(roles, n, VGI_NECK, 0) || !has(roles, n, VGI_UPPER_ARM, 0)) return;
+    if (has_role(roles, n, VGI_NECK, 0) || !has_role(roles, n, VGI_UPPER_ARM, 0)) return;
     find_above(s, roles, VGI_UPPER_ARM, below);
     for (size_t j = 0; j < n; j++)
         if (roles[j].part == VGI_SPINE && !below[j]) roles[j].part = VGI_NECK, last = j;
-    if (last < n && !has(roles, n, VGI_HEAD, 0)) roles[last].part = VGI_HEAD;
+    if (last < n && !has_role(roles, n, VGI_HEAD, 0)) roles[last].part = VGI_HEAD;
 }
 
 int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e)

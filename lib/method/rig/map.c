@@ -420,7 +420,7 @@ static int fit_hinges(const vg_map_fitter *f, vg_map *m, vg_err *e)
 }
 
 /* Error of the hinges in pose k: delta (3 x n) = t - root - place A. */
-static void missed(const vg_map_fitter *f, const vg_map *m, size_t k, double *delta)
+static void hinge_errors(const vg_map_fitter *f, const vg_map *m, size_t k, double *delta)
 {
     size_t n = m->n;
     const vgi_motion *motion = f->motion + k * n;
@@ -456,11 +456,11 @@ typedef struct ridge {
     double *delta, *work;
 } ridge;
 
-static void gather(ridge *x)
+static void sum_rows(ridge *x)
 {
     size_t w = x->width, n = x->n;
     for (size_t k = 0; k < x->f->poses; k++) {
-        missed(x->f, x->m, k, x->delta);
+        hinge_errors(x->f, x->m, k, x->delta);
         for (size_t c = 0; c < 3; c++) {
             row_of(x->f, k, c, x->work);
             for (size_t i = 0; i < w; i++) {
@@ -491,7 +491,7 @@ static double left_out(ridge *x, size_t k)
 {
     size_t w = x->width, n = x->n;
     double *rows = x->work, *solved = x->work + 3 * w, h[9], c[9], sum = 0;
-    missed(x->f, x->m, k, x->delta);
+    hinge_errors(x->f, x->m, k, x->delta);
     for (size_t i = 0; i < 3; i++) row_of(x->f, k, i, rows + i * w);
     for (size_t i = 0; i < w; i++)
         for (size_t q = 0; q < 3; q++) solved[3 * i + q] = rows[q * w + i];
@@ -527,10 +527,10 @@ static int correct_place(const vg_map_fitter *f, vg_map *m, vg_err *e)
     bool ok = x.s && x.l && x.y && x.g && x.delta && x.work;
     if (ok) {
         double least = 0, best = -1, trace = 0;
-        gather(&x);
+        sum_rows(&x);
         for (size_t i = 0; i < w; i++) trace += x.s[i * w + i] / (double)w;
         for (size_t i = 0; i < tried; i++) { /* first without correction */
-            missed(f, m, i * f->poses / tried, x.delta);
+            hinge_errors(f, m, i * f->poses / tried, x.delta);
             for (size_t p = 0; p < n; p++)
                 for (size_t c = 0; c < 3; c++) least += m->share[p] * x.delta[c * n + p] * x.delta[c * n + p];
         }

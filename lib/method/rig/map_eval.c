@@ -188,7 +188,7 @@ static void root_of(const vg_player *p, const double *centre, double root[3])
 }
 
 /* Position of patch i given by the hinges, relative to the root. */
-static void placed(const vg_player *p, size_t i, double t[3])
+static void hinge_position(const vg_player *p, size_t i, double t[3])
 {
     size_t n = p->m->n;
     const double *g = p->m->place + 3 * n * i;
@@ -207,7 +207,7 @@ void vg_player_place(vg_player *p, double *transforms)
     read_motion(p, transforms);
     root_of(p, p->m->centre, root);
     for (size_t i = 0; i < p->m->n; i++) {
-        placed(p, i, t);
+        hinge_position(p, i, t);
         vgi_sum(t, root, transforms + 7 * i + 4);
     }
 }
@@ -222,7 +222,7 @@ static void remember_end(vg_player *p, const double *transforms, double *miss, d
     for (size_t i = 0; i < p->m->n; i++) {
         const double *a = p->motion + 12 * i;
         double t[3] = {0, 0, 0}, d[3];
-        if (!p->m->has_home) placed(p, i, t);
+        if (!p->m->has_home) hinge_position(p, i, t);
         vgi_subtract(a + 9, root, d), vgi_deduct(d, t);
         vgi_transposed_vector(a, d, miss + 3 * i);
         vgi_divide(miss + 3 * i, vgi_dot(a, a));
@@ -231,7 +231,7 @@ static void remember_end(vg_player *p, const double *transforms, double *miss, d
 
 /* Logarithm of b a^-1, on the branch nearest to the neighbour's. l[1..3] is half the angle, so branches differ by
  * half turns. */
-static void difference(const double *a, const double *b, const double *neighbour, double l[4])
+static void log_difference(const double *a, const double *b, const double *neighbour, double l[4])
 {
     double s = a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3], q[4];
     const double back[4] = {a[0] / s, -a[1] / s, -a[2] / s, -a[3] / s};
@@ -256,7 +256,7 @@ void vg_player_between(vg_player *p, const double *a, const double *b, double t,
     for (size_t k = 0; k < n; k++) {
         size_t i = p->order[k], up = p->parent[i];
         double l[4], q[4];
-        difference(a + 7 * i, b + 7 * i, up == i ? NULL : logs + 12 * up, logs + 12 * i);
+        log_difference(a + 7 * i, b + 7 * i, up == i ? NULL : logs + 12 * up, logs + 12 * i);
         for (int j = 0; j < 4; j++) l[j] = t * logs[12 * i + (size_t)j];
         vg_quat_exp(l, q);
         vg_quat_multiply(q, a + 7 * i, out + 7 * i);
@@ -264,7 +264,7 @@ void vg_player_between(vg_player *p, const double *a, const double *b, double t,
     read_motion(p, out);
     for (size_t i = 0; i < n; i++) {
         double at[3] = {0, 0, 0}, miss[3], turned[3];
-        if (!p->m->has_home) placed(p, i, at);
+        if (!p->m->has_home) hinge_position(p, i, at);
         vgi_mix(p->ends + 3 * i, p->ends + 3 * (n + i), t, miss);
         vgi_multiply_vector(p->motion + 12 * i, miss, turned);
         for (size_t k = 0; k < 3; k++)
@@ -299,7 +299,7 @@ static void fill_columns(vg_player *p, playing *x, size_t k, const double *trans
     for (size_t i = 0; i < n; i++) {
         const double *a = p->motion + 12 * i;
         double t[3] = {a[9] - root[0], a[10] - root[1], a[11] - root[2]};
-        if (m->has_home) placed(p, i, t);
+        if (m->has_home) hinge_position(p, i, t);
         for (size_t c = 0; c < 3; c++)
             for (size_t j = 0; j < 4; j++) {
                 double value = j < 3 ? a[3 * c + j] : t[c];

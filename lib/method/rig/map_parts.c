@@ -130,7 +130,7 @@ int vgi_place_by_hinges(const vg_map *m, const double *centre, double *place, vg
     bool ok = vgi_spd_factor(n, l);
     if (ok) vgi_spd_solve(n, l, 3 * n, place);
     free(l);
-    return ok ? VG_OK : vg_fail(e, VG_EINPUT, "the patches do not hang together");
+    return ok ? VG_OK : vg_fail(e, VG_EINPUT, "the patches are not connected");
 }
 
 uint32_t *vgi_graph_patches(const vg_head *h, const vg_patches *patches, const vg_graph *g, vg_err *e)
@@ -277,7 +277,7 @@ void vgi_map_skin_row(vg_map *m, const vgi_map_body *body, size_t v)
 }
 
 /* A vertex without a face follows the patch with the nearest centre, or its skin. */
-static void carry_loose(vg_map *m, const vgi_map_body *body, const vg_graph *g)
+static void attach_loose(vg_map *m, const vgi_map_body *body, const vg_graph *g)
 {
     for (size_t v = 0; v < g->faces.nv; v++) {
         if (g->in_face[v]) continue;
@@ -328,7 +328,7 @@ int vgi_map_collapse(vg_map *m, const vgi_map_body *body, const vg_graph *g, con
                             (const double *const *)(x + 3 * batch));
             for (size_t i = 0; i < n; i++) store_column(m, g, first + i, x[i]);
         }
-        carry_loose(m, body, g);
+        attach_loose(m, body, g);
     } else {
         r = VG_ENOMEM;
     }

@@ -42,7 +42,7 @@ VGI_INLINE void put_point(double *to, const void *from, bool single, point root)
     }
 }
 
-VGI_INLINE void spread(const void *product, bool single, size_t rows, size_t n, const double (*roots)[3],
+VGI_INLINE void spread_poses(const void *product, bool single, size_t rows, size_t n, const double (*roots)[3],
                        double *const *vertices, size_t first)
 {
     size_t size = single ? sizeof(float) : sizeof(double), stride = 3 * n;
@@ -66,13 +66,13 @@ VGI_INLINE void spread(const void *product, bool single, size_t rows, size_t n, 
 static void spread_single(const float *product, size_t rows, size_t n, const double (*roots)[3],
                           double *const *vertices, size_t first)
 {
-    spread(product, true, rows, n, roots, vertices, first);
+    spread_poses(product, true, rows, n, roots, vertices, first);
 }
 
 static void spread_double(const double *product, size_t rows, size_t n, const double (*roots)[3],
                           double *const *vertices, size_t first)
 {
-    spread(product, false, rows, n, roots, vertices, first);
+    spread_poses(product, false, rows, n, roots, vertices, first);
 }
 
 const vgi_play_kernel VGI_OF_SET(vgi_play_kernel) = {spread_single, spread_double};

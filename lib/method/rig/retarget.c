@@ -215,12 +215,12 @@ static int check_map(const vg_head *h, vg_err *e)
                : vg_fail(e, VG_EINPUT, "there is no map to retarget");
 }
 
-static int prepare(retargeting *x, vg_err *e)
+static int prepare_retargeting(retargeting *x, vg_err *e)
 {
     const vg_head *h = x->h;
     int r = vg_head_graph(&x->g, h, e);
     if (r == VG_OK && h->map.ncorners && h->map.ncorners != vg_graph_corners(x->g))
-        r = vg_fail(e, VG_EINPUT, "the map does not say how its corners turn");
+        r = vg_fail(e, VG_EINPUT, "the map has no rotations of its corners");
     if (r == VG_OK) r = vg_map_copy(x->m, &h->map, e);
     if (r == VG_OK) r = vg_rig_copy(x->rig, &h->body.rig, h->body.mesh.nv, e);
     if (r == VG_OK && h->map.kind == VG_MAP_PATCHES && !(x->of_face = vgi_graph_patches(h, &h->body.patches, x->g, e)))
@@ -259,12 +259,12 @@ static int move_map(retargeting *x, vg_err *e)
     x->ratio = after / before;
     if (!(before > 0 && after > 0)) return vg_fail(e, VG_EINPUT, "a body without extent cannot be retargeted");
     if (!(isfinite(x->ratio * x->m->size) && x->ratio * x->m->size > 0))
-        return vg_fail(e, VG_EINPUT, "the new body is too large or too small beside that of the map");
+        return vg_fail(e, VG_EINPUT, "the new body is too large or too small relative to that of the map");
     return x->m->kind == VG_MAP_BONES ? move_bones(x->m, x->rig, from->reference, x->body, e)
                                       : move_points(x->m, from, x->g, x->of_face, x->body, x->ratio, e);
 }
 
-static int weigh(retargeting *x, vg_err *e)
+static int find_weights(retargeting *x, vg_err *e)
 {
     const vgi_map_body body = {x->body, x->rig};
     for (size_t v = 0; !x->m->ncorners && v < x->m->nv; v++) vgi_map_skin_row(x->m, &body, v);
@@ -282,12 +282,12 @@ int vg_map_retarget(const vg_head *h, const double *target, double morph, int th
     *map = (vg_map){0}, *rig = (vg_rig){0};
     int r = check_map(h, e);
     if (r == VG_OK && !(x.body = vgi_copy_array(target, 3 * nv, sizeof *x.body, e))) r = VG_ENOMEM;
-    if (r == VG_OK) r = prepare(&x, e);
+    if (r == VG_OK) r = prepare_retargeting(&x, e);
     if (r == VG_OK) r = keep_regression(&x, e);
     if (r == VG_OK && morph != 1) r = morph_body(h, x.g, target, morph, x.body, threads, e);
     if (r == VG_OK) r = move_map(&x, e);
     if (r == VG_OK) r = keep_home(&x, e);
-    if (r == VG_OK) r = weigh(&x, e);
+    if (r == VG_OK) r = find_weights(&x, e);
     if (r == VG_OK && nv) memcpy(reference, x.body, 3 * nv * sizeof *reference);
     if (r < 0) vg_map_clear(map), vg_rig_clear(rig);
     vg_graph_free(&x.g);

@@ -153,7 +153,7 @@ static void solve_small(double a[3][3], double *b, size_t n)
 
 /* Compute the weights of the chosen bones, removing one by one those that would be negative, and the value of the
  * quadratic. */
-static void weigh(const quadratic *q, choice *c)
+static void weigh_bones(const quadratic *q, choice *c)
 {
     for (;;) {
         size_t n = c->n - 1, base = c->at[n];
@@ -186,28 +186,28 @@ static void weigh(const quadratic *q, choice *c)
     }
 }
 
-static bool has(const choice *c, size_t k)
+static bool has_bone(const choice *c, size_t k)
 {
     for (size_t i = 0; i < c->n; i++)
         if (c->at[i] == k) return true;
     return false;
 }
 
-static void choose(const quadratic *q, double least_gain, choice *best)
+static void choose_bones(const quadratic *q, double least_gain, choice *best)
 {
     *best = (choice){.n = 1, .w = {1}};
     for (size_t k = 0; k < q->n; k++)
         if (q->g[k][k] - 2 * q->b[k] < q->g[best->at[0]][best->at[0]] - 2 * q->b[best->at[0]]) best->at[0] = k;
-    weigh(q, best);
+    weigh_bones(q, best);
     for (int round = 0; round < 2 * VG_SKIN; round++) { /* add or replace a bone */
         choice next = *best;
         for (size_t k = 0; k < q->n; k++) {
-            if (has(best, k)) continue;
+            if (has_bone(best, k)) continue;
             for (size_t out = best->n < VG_SKIN ? VG_SKIN : 0; out < (best->n < VG_SKIN ? VG_SKIN + 1 : best->n);
                  out++) {
                 choice c = *best;
                 c.at[out < VG_SKIN ? out : c.n++] = k;
-                weigh(q, &c);
+                weigh_bones(q, &c);
                 if (c.value < next.value) next = c;
             }
         }
@@ -238,7 +238,7 @@ typedef struct skinning {
 } skinning;
 
 /* One entry of G: the product of bones i and j at the point. */
-static double product(const skinning *x, size_t i, size_t j, const double *v)
+static double bone_product(const skinning *x, size_t i, size_t j, const double *v)
 {
     size_t width = 4 * x->s->n;
     const double *a = x->s->at + 3 * i, *b = x->s->at + 3 * j, *c = x->s->cross + 4 * i * width + 4 * j;
@@ -250,7 +250,7 @@ static double product(const skinning *x, size_t i, size_t j, const double *v)
     return sum;
 }
 
-static double along(const skinning *x, size_t j, size_t v)
+static double pull_product(const skinning *x, size_t j, size_t v)
 {
     const double *at = x->s->at + 3 * j, *p = x->reference + 3 * v, *y = x->s->pull + v * 4 * x->s->n + 4 * j;
     return (p[0] - at[0]) * y[0] + (p[1] - at[1]) * y[1] + (p[2] - at[2]) * y[2] + y[3];
@@ -296,17 +296,17 @@ static void skin_vertex(const skinning *x, size_t v, double *far, double *alone)
     quadratic q = {.ridge = 0};
     choice c;
     distances(x->b, p, far);
-    for (size_t j = 0; j < s->n; j++) alone[j] = product(x, j, j, p) - 2 * along(x, j, v) + nearness * poses * far[j];
+    for (size_t j = 0; j < s->n; j++) alone[j] = bone_product(x, j, j, p) - 2 * pull_product(x, j, v) + nearness * poses * far[j];
     find_candidates(x, alone, &q);
     for (size_t i = 0; i < q.n; i++) {
-        q.b[i] = along(x, q.bone[i], v) - 0.5 * nearness * poses * far[q.bone[i]];
-        for (size_t j = 0; j <= i; j++) q.g[i][j] = q.g[j][i] = product(x, q.bone[i], q.bone[j], p);
+        q.b[i] = pull_product(x, q.bone[i], v) - 0.5 * nearness * poses * far[q.bone[i]];
+        for (size_t j = 0; j <= i; j++) q.g[i][j] = q.g[j][i] = bone_product(x, q.bone[i], q.bone[j], p);
     }
-    choose(&q, least_gain * poses * x->diagonal * x->diagonal, &c);
+    choose_bones(&q, least_gain * poses * x->diagonal * x->diagonal, &c);
     first_last(&c);
-    for (size_t i = 0; i < q.n; i++) q.b[i] = along(x, q.bone[i], v);
+    for (size_t i = 0; i < q.n; i++) q.b[i] = pull_product(x, q.bone[i], v);
     q.ridge = poses * apart * apart * x->diagonal * x->diagonal;
-    weigh(&q, &c);
+    weigh_bones(&q, &c);
     uint32_t *bone = x->r->skin_bone + VG_SKIN * v;
     double *weight = x->r->skin_weight + VG_SKIN * v, left = s->square[v];
     for (size_t i = 0; i < VG_SKIN; i++) {
@@ -319,9 +319,9 @@ static void skin_vertex(const skinning *x, size_t v, double *far, double *alone)
         c.w[best] = 0;
     }
     for (size_t i = 0; i < VG_SKIN; i++) {
-        left -= 2 * weight[i] * along(x, bone[i], v);
+        left -= 2 * weight[i] * pull_product(x, bone[i], v);
         for (size_t k = 0; k < VG_SKIN; k++)
-            if (weight[i] > 0 && weight[k] > 0) left += weight[i] * weight[k] * product(x, bone[i], bone[k], p);
+            if (weight[i] > 0 && weight[k] > 0) left += weight[i] * weight[k] * bone_product(x, bone[i], bone[k], p);
     }
     if (x->miss) x->miss[v] = left > 0 ? sqrt(left / poses) : 0;
 }

@@ -384,7 +384,7 @@ static void run_worker(void *context, size_t worker)
         j->step(j, work, first, first + CHUNK < nf ? first + CHUNK : nf);
 }
 
-static void run(deform_job *j)
+static void run_deform(deform_job *j)
 {
     atomic_init(&j->next, 0);
     vgi_parallel(j->d->threads, (size_t)j->d->threads, run_worker, j);
@@ -403,7 +403,7 @@ void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *c
                          double *const *quaternions)
 {
     deform_job j = {.d = d, .n = n, .kind = kind, .in = poses, .out = quaternions, .step = measure_step};
-    run(&j);
+    run_deform(&j);
 }
 
 static void apply_step(deform_job *j, double *work, size_t first, size_t last)
@@ -417,7 +417,7 @@ static void apply_step(deform_job *j, double *work, size_t first, size_t last)
 void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors)
 {
     deform_job j = {.d = d, .n = n, .in = quaternions, .out = vectors, .step = apply_step};
-    run(&j);
+    run_deform(&j);
 }
 
 static void transfer_slowly(deform_job *j, double *work, size_t f, size_t p)
@@ -474,5 +474,5 @@ static void transfer_step(deform_job *j, double *work, size_t first, size_t last
 void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors)
 {
     deform_job j = {.d = d, .n = n, .kind = kind, .in = poses, .out = vectors, .step = transfer_step};
-    run(&j);
+    run_deform(&j);
 }

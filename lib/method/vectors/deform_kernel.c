@@ -38,7 +38,7 @@ VGI_INLINE vec add(vec a, vec b)
     return (vec){{a.at[0] + b.at[0], a.at[1] + b.at[1], a.at[2] + b.at[2]}};
 }
 
-VGI_INLINE vec load(const double *const *p, size_t i)
+VGI_INLINE vec load_vec(const double *const *p, size_t i)
 {
     vec v;
     vgi_gather_point(p, 3 * i, v.at);
@@ -51,13 +51,13 @@ VGI_INLINE void load_face(const vgi_transfer *t, const double *const *poses, uin
     if (t->vertices) {
         vec centre = {{{0}}};
         for (size_t i = 0; i < r; i++) {
-            w[i] = load(poses, t->vert[begin + i]);
+            w[i] = load_vec(poses, t->vert[begin + i]);
             centre = add(centre, w[i]);
         }
         vec back = times(centre, vgi_same(-1.0 / (double)r));
         for (size_t i = 0; i < r; i++) w[i] = add(w[i], back);
     } else {
-        for (size_t i = 0; i < r; i++) w[i] = load(poses, begin + i);
+        for (size_t i = 0; i < r; i++) w[i] = load_vec(poses, begin + i);
     }
     w[r] = w[0];
 }

@@ -21,7 +21,7 @@ typedef struct point {
 } point;
 
 /* Three numbers of an array; the fourth is 0. */
-VGI_INLINE point load(const double *p)
+VGI_INLINE point load_point(const double *p)
 {
 #if VGI_WIDTH == 2
     return (point){{*(const vgi_pair_at *)p, (piece){p[2], 0}}};
@@ -30,7 +30,7 @@ VGI_INLINE point load(const double *p)
 #endif
 }
 
-VGI_INLINE void store(double *p, point a)
+VGI_INLINE void store_point(double *p, point a)
 {
     *(vgi_pair_at *)p = __builtin_shufflevector(a.at[0], a.at[0], 0, 1);
     p[2] = a.at[PIECES - 1][2 % (4 / PIECES)];
@@ -74,7 +74,7 @@ VGI_INLINE point times(double s, point a)
 VGI_INLINE void put_anchors(const vgi_guesser *s, const double *anchors, double *x)
 {
     for (size_t i = 0; i < s->nanchors; i++)
-        store(x + 3 * (size_t)s->anchors[i], less(load(anchors + 3 * i), load(anchors)));
+        store_point(x + 3 * (size_t)s->anchors[i], less(load_point(anchors + 3 * i), load_point(anchors)));
 }
 
 /* Translate all vertices so that the mean of the anchors is where it should be. */
@@ -82,12 +82,12 @@ VGI_INLINE void move_to_anchors(const vgi_guesser *s, const double *anchors, dou
 {
     point shift = {0};
     for (size_t i = 0; i < s->nanchors; i++)
-        shift = add(shift, less(less(load(anchors + 3 * i), load(anchors)), load(x + 3 * (size_t)s->anchors[i])));
+        shift = add(shift, less(less(load_point(anchors + 3 * i), load_point(anchors)), load_point(x + 3 * (size_t)s->anchors[i])));
     shift = times(1.0 / (double)s->nanchors, shift);
-    for (size_t v = 0; v < s->g->faces.nv; v++) store(x + 3 * v, add(load(x + 3 * v), shift));
+    for (size_t v = 0; v < s->g->faces.nv; v++) store_point(x + 3 * v, add(load_point(x + 3 * v), shift));
 }
 
-VGI_INLINE void walk(const vgi_guesser *s, const double *w, const double *anchors, double *x)
+VGI_INLINE void walk_tree(const vgi_guesser *s, const double *w, const double *anchors, double *x)
 {
     const uint32_t *vert = s->g->faces.vert;
     bool from_one = s->pinned < s->g->faces.nv;
@@ -95,8 +95,8 @@ VGI_INLINE void walk(const vgi_guesser *s, const double *w, const double *anchor
     else put_anchors(s, anchors, x);
     for (size_t i = 0; i < s->nsteps; i++) {
         size_t c = s->walk[i].corner, from = s->walk[i].from;
-        point step = less(load(w + 3 * c), load(w + 3 * from));
-        store(x + 3 * (size_t)vert[c], add(load(x + 3 * (size_t)vert[from]), step));
+        point step = less(load_point(w + 3 * c), load_point(w + 3 * from));
+        store_point(x + 3 * (size_t)vert[c], add(load_point(x + 3 * (size_t)vert[from]), step));
     }
     if (from_one && s->nanchors) move_to_anchors(s, anchors, x);
     put_anchors(s, anchors, x);
@@ -138,10 +138,10 @@ VGI_INLINE void add_pull(const vgi_guesser *s, size_t f, size_t size, const doub
     size_t begin = s->g->faces.start[f];
     const uint32_t *vert = s->g->faces.vert + begin;
     const double *wf = w + 3 * begin;
-    point w0 = load(wf), x0 = load(x + 3 * (size_t)vert[0]), mean = {0};
+    point w0 = load_point(wf), x0 = load_point(x + 3 * (size_t)vert[0]), mean = {0};
     store_sum(e[0], mean);
     for (size_t i = 1; i < size; i++) {
-        point miss = less(less(load(wf + 3 * i), w0), less(load(x + 3 * (size_t)vert[i]), x0));
+        point miss = less(less(load_point(wf + 3 * i), w0), less(load_point(x + 3 * (size_t)vert[i]), x0));
         store_sum(e[i], miss);
         mean = add(mean, miss);
     }
@@ -150,7 +150,7 @@ VGI_INLINE void add_pull(const vgi_guesser *s, size_t f, size_t size, const doub
     for (size_t i = 0; i < size; i++) add_to(sum, vert[i], less(load_sum(e[i]), mean));
 }
 
-VGI_INLINE void fold(const vgi_guesser *s, const double *w, const double *x, vgi_point *sum, double *rhs)
+VGI_INLINE void add_pulls(const vgi_guesser *s, const double *w, const double *x, vgi_point *sum, double *rhs)
 {
     const vg_graph *g = s->g;
     vgi_point e[4];
@@ -161,14 +161,14 @@ VGI_INLINE void fold(const vgi_guesser *s, const double *w, const double *x, vgi
         else if (size == 4) add_pull(s, f, 4, w, x, e, sum);
         else add_pull(s, f, size, w, x, sum + g->faces.nv, sum);
     }
-    for (size_t v = 0; v < g->faces.nv; v++) store(rhs + 3 * v, load_sum(sum[v]));
+    for (size_t v = 0; v < g->faces.nv; v++) store_point(rhs + 3 * v, load_sum(sum[v]));
 }
 
 static void guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,
                   vgi_point *space)
 {
-    walk(s, w, anchors, x);
-    fold(s, w, x, space, rhs);
+    walk_tree(s, w, anchors, x);
+    add_pulls(s, w, x, space, rhs);
 }
 
 const vgi_guess_kernel VGI_OF_SET(vgi_guess_kernel) = {guess};

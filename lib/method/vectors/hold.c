@@ -93,7 +93,7 @@ static int check_anchors(const vg_solver *s, vg_err *e)
     int r = VG_OK;
     for (size_t i = 0; r == VG_OK && i < s->like->nanchors; i++)
         if (!here[s->like->anchors[i]])
-            r = vg_fail(e, VG_EARG, "vertex %u is an anchor of the other solver and not of this one", s->like->anchors[i]);
+            r = vg_fail(e, VG_EARG, "vertex %u is an anchor of the base solver but not of this one", s->like->anchors[i]);
     free(here);
     return r;
 }
@@ -123,7 +123,7 @@ static int number_rows(vg_solver *s, vg_err *e)
     return VG_OK;
 }
 
-static int hold(vg_solver *s, vg_err *e)
+static int hold_anchors(vg_solver *s, vg_err *e)
 {
     const vgi_sharing *shared = s->like->sharing;
     double begin = vgi_solver_seconds();
@@ -147,7 +147,7 @@ static int make_like(vg_solver **out, const vg_solver *like, const uint32_t *anc
     s->pinned = n ? (uint32_t)s->g->faces.nv : like->pinned;
     s->nanchors = n;
     s->anchors = vgi_copy_array(anchors, n, sizeof *anchors, e);
-    int r = s->anchors ? hold(s, e) : VG_ENOMEM;
+    int r = s->anchors ? hold_anchors(s, e) : VG_ENOMEM;
     if (r < 0) vg_solver_free(out);
     return r;
 }
@@ -170,7 +170,7 @@ int vg_solver_new_like(vg_solver **s, size_t n, vg_solver *like, const uint32_t 
                        vg_err *e)
 {
     for (size_t i = 0; i < n; i++) s[i] = NULL;
-    if (like->like) return vg_fail(e, VG_EARG, "a solver that is like another one cannot be taken as a pattern");
+    if (like->like) return vg_fail(e, VG_EARG, "a derived solver cannot be the base of another one");
     int r = vgi_solver_share(like, e);
     if (r < 0) return r;
     vg_err *errors = vgi_array(n, sizeof *errors, e);

@@ -126,7 +126,7 @@ static void turn_lines(vg_path *p, const double *from)
 
 /* ---- a segment ---- */
 
-static int measure(vg_path *p, const segment *s, vg_err *e)
+static int measure_segment(vg_path *p, const segment *s, vg_err *e)
 {
     vg_deformer *d;
     const double *to = p->to;
@@ -201,7 +201,7 @@ static void find_drift(vg_path *p, segment *s)
     }
 }
 
-static int fill(vg_path *p, segment *s, size_t number, vg_err *e)
+static int fill_segment(vg_path *p, segment *s, size_t number, vg_err *e)
 {
     const vg_graph *g = p->g;
     const vg_key *key = p->keys + number;
@@ -214,7 +214,7 @@ static int fill(vg_path *p, segment *s, size_t number, vg_err *e)
         load_anchors(p, key + k, k ? p->to : s->from, s->middle[k]);
     }
     double *face = vgi_array_raw(g->faces.nf, 3 * sizeof *face, e);
-    int r = face ? measure(p, s, e) : VG_ENOMEM;
+    int r = face ? measure_segment(p, s, e) : VG_ENOMEM;
     if (r == VG_OK) r = vgi_choose_turns(g, p->q, face, &beyond, e);
     for (size_t f = 0; r == VG_OK && f < g->faces.nf; f++)
         for (size_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
@@ -235,7 +235,7 @@ static int get_segment(vg_path *p, size_t number, const segment **s, vg_err *e)
 {
     segment *slot = &p->slots[p->o.smooth ? number % SLOTS : 0];
     *s = slot;
-    return slot->number == number ? VG_OK : fill(p, slot, number, e);
+    return slot->number == number ? VG_OK : fill_segment(p, slot, number, e);
 }
 
 /* ---- velocities at keys ---- */
@@ -460,9 +460,10 @@ int vg_path_new(vg_path **out, const vg_graph *g, const double *reference, const
                 const vg_path_options *o, vg_err *e)
 {
     *out = NULL;
-    if (nkeys < 2) return vg_fail(e, VG_EARG, "a path needs two poses or more");
+    if (nkeys < 2) return vg_fail(e, VG_EARG, "a path needs at least two poses");
     for (size_t i = 0; i + 1 < nkeys; i++)
-        if (!(keys[i + 1].place > keys[i].place)) return vg_fail(e, VG_EARG, "the places of a path's keys must grow");
+        if (!(keys[i + 1].place > keys[i].place)) return vg_fail(e, VG_EARG, "the positions of a path's keys must "
+                                                                             "ascend");
     vg_path *p = *out = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
     double D = vg_diagonal(reference, g->faces.nv);

@@ -35,7 +35,7 @@ struct joining {
     vgi_incidence around;
 };
 
-static void clear(struct joining *j)
+static void clear_joining(struct joining *j)
 {
     free(j->x);
     free(j->vertex);
@@ -86,7 +86,7 @@ static int gather_points(struct joining *j, const uint32_t *label, vg_err *e)
     return r;
 }
 
-static int prepare(struct joining *j, const double *vertices, const uint32_t *label, vg_err *e)
+static int prepare_joining(struct joining *j, const double *vertices, const uint32_t *label, vg_err *e)
 {
     int r = scale_vertices(j, vertices, e);
     if (r == VG_OK) r = gather_points(j, label, e);
@@ -104,7 +104,7 @@ static int prepare(struct joining *j, const double *vertices, const uint32_t *la
 
 /* A total order of pairs, with ties broken by index, so that the shortest connections never form a cycle. Among the
  * points at equal distance from i the lowest one makes the smallest pair; the k-d tree returns that one. */
-static bool shorter(const struct edge *p, const struct edge *q)
+static bool shorter_edge(const struct edge *p, const struct edge *q)
 {
     if (p->square != q->square) return p->square < q->square;
     return p->a != q->a ? p->a < q->a : p->b < q->b;
@@ -114,7 +114,7 @@ static void offer(struct joining *j, uint32_t from, vgi_near to)
 {
     struct edge edge = {to.square, from < to.index ? from : to.index, from < to.index ? to.index : from};
     struct edge *best = &j->best[j->tree[from]];
-    if (shorter(&edge, best)) *best = edge;
+    if (shorter_edge(&edge, best)) *best = edge;
 }
 
 /* Find the shortest connection of every tree. near[i] caches the last search result for point i: the nearest point of
@@ -154,7 +154,7 @@ static void span(struct joining *j)
 
 /* ---- the links ---- */
 
-static double distance(const struct joining *j, uint32_t u, uint32_t v)
+static double vertex_distance(const struct joining *j, uint32_t u, uint32_t v)
 {
     const double *p = j->x + 3 * (size_t)u, *q = j->x + 3 * (size_t)v;
     return sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]));
@@ -174,7 +174,7 @@ static double mean_edge(const struct joining *j, uint32_t v)
     double sum = 0;
     for (uint32_t i = first; i < last; i++) {
         vgi_corner_edges(j->m->start, j->m->vert, j->around.face[i], j->around.corner[i], ends);
-        sum += distance(j, v, ends[0]) + distance(j, v, ends[1]);
+        sum += vertex_distance(j, v, ends[0]) + vertex_distance(j, v, ends[1]);
     }
     return sum / (2.0 * (last - first));
 }
@@ -183,11 +183,11 @@ static double mean_edge(const struct joining *j, uint32_t v)
 static uint32_t farthest_around(const struct joining *j, uint32_t a, uint32_t b)
 {
     uint32_t last = last_corner(j, b), farthest = b, ends[2];
-    double most = distance(j, a, b);
+    double most = vertex_distance(j, a, b);
     for (uint32_t i = j->around.first[b]; i < last; i++) {
         vgi_corner_edges(j->m->start, j->m->vert, j->around.face[i], j->around.corner[i], ends);
         for (int k = 0; k < 2; k++) {
-            double length = distance(j, a, ends[k]);
+            double length = vertex_distance(j, a, ends[k]);
             if (length > most) most = length, farthest = ends[k];
         }
     }
@@ -201,7 +201,7 @@ static uint32_t farthest_around(const struct joining *j, uint32_t a, uint32_t b)
 static void place_link(const struct joining *j, const struct edge *edge, uint32_t pair[2])
 {
     uint32_t a = j->vertex[edge->a], b = j->vertex[edge->b];
-    double length = distance(j, a, b), edge_a = mean_edge(j, a), edge_b = mean_edge(j, b);
+    double length = vertex_distance(j, a, b), edge_a = mean_edge(j, a), edge_b = mean_edge(j, b);
     if (edge_a > edge_b && length < edge_a) a = farthest_around(j, b, a);
     else if (length < edge_b) b = farthest_around(j, a, b);
     pair[0] = a < b ? a : b;
@@ -235,12 +235,12 @@ int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pair
     if (!label) return VG_ENOMEM;
     int r = vg_mesh_components(m, label, &j.components, e);
     if (r < 0 || j.components < 2) goto out;
-    r = prepare(&j, vertices, label, e);
+    r = prepare_joining(&j, vertices, label, e);
     if (r < 0) goto out;
     span(&j);
     r = list_links(&j, pairs, n, e);
 out:
-    clear(&j);
+    clear_joining(&j);
     free(label);
     return r;
 }

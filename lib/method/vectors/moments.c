@@ -23,7 +23,7 @@ bool vgi_unit_normal(const double *w, size_t r, double n[3])
 }
 
 /* Returns false if the matrix is singular. */
-static bool invert(const double a[6], double inverse[6])
+static bool invert_symmetric(const double a[6], double inverse[6])
 {
     double c0 = a[3] * a[5] - a[4] * a[4], c1 = a[2] * a[4] - a[1] * a[5], c2 = a[1] * a[4] - a[2] * a[3];
     double det = a[0] * c0 + a[1] * c1 + a[2] * c2, size = a[0] + a[3] + a[5];
@@ -55,7 +55,7 @@ bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3], d
     double h = (sum[0] + sum[3] + sum[5]) / 2;
     sum[0] += h * n[0] * n[0], sum[1] += h * n[0] * n[1], sum[2] += h * n[0] * n[2];
     sum[3] += h * n[1] * n[1], sum[4] += h * n[1] * n[2], sum[5] += h * n[2] * n[2];
-    if (!invert(sum, P)) return false;
+    if (!invert_symmetric(sum, P)) return false;
     vgi_symmetric_times(P, n, q);
     vgi_scale(q, h);
     return true;

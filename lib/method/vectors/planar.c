@@ -68,7 +68,7 @@ int vg_planar_new(vg_planar **out, const vg_solver *s, double fidelity, double p
 {
     *out = NULL;
     if (!(fidelity > 0) || !(planarity >= 0) || !isfinite(planarity / fidelity))
-        return vg_fail(e, VG_EARG, "the weights of planarity are one above 0 and one of at least 0, not %g and %g",
+        return vg_fail(e, VG_EARG, "the weights of planarity must be one above 0 and one of at least 0, not %g and %g",
                        fidelity, planarity);
     vg_planar *p = *out = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
@@ -180,7 +180,7 @@ static bool all_done(const vgi_lanes start, const vgi_lanes rz, double *left, bo
 }
 
 /* Conjugate gradients on (N + ratio P) x = r. left[k]: relative residual with which pose k ended. */
-static size_t descend(const vg_planar *p, const room *m, const vgi_planar_faces *f, double *left)
+static size_t conjugate_gradients(const vg_planar *p, const room *m, const vgi_planar_faces *f, double *left)
 {
     const vgi_planar_kernel *kernel = vgi_planar_kernel_now();
     size_t n = p->solver.rows, steps = 0;
@@ -230,7 +230,7 @@ static void plane_block(void *context, size_t i)
     vgi_load_rows(m->normals, p->faces.order, p->faces.nf, p->faces.nf, normals);
     vgi_lanes unit;
     load_residual(p, m, &f, pose, unit);
-    size_t steps = descend(p, m, &f, left);
+    size_t steps = conjugate_gradients(p, m, &f, left);
     vgi_planar_kernel_now()->scale(p->solver.rows, unit, m->x, m->x);
     vgi_add_rows(m->x, p->solver.row, p->solver.g->faces.nv, p->solver.rows, j->x + first, lanes);
     for (size_t k = 0; k < lanes; k++) {

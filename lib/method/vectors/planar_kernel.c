@@ -7,21 +7,21 @@
 /* A row is PIECES vectors; piece i holds part i % VGI_PARTS of the poses. */
 enum { PIECES = 3 * VGI_PARTS };
 
-VGI_INLINE vgi_wide piece(const vgi_row *a, size_t i)
+VGI_INLINE vgi_wide row_piece(const vgi_row *a, size_t i)
 {
     return vgi_load((const double *)a + i * VGI_WIDTH);
 }
 
-VGI_INLINE void put(vgi_row *a, size_t i, vgi_wide x)
+VGI_INLINE void put_piece(vgi_row *a, size_t i, vgi_wide x)
 {
     vgi_store((double *)a + i * VGI_WIDTH, x);
 }
 
 VGI_INLINE vgi_wide dot_part(const vgi_row *a, const vgi_row *b, size_t part)
 {
-    vgi_wide sum = piece(a, part) * piece(b, part);
-    sum += piece(a, VGI_PARTS + part) * piece(b, VGI_PARTS + part);
-    return sum + piece(a, 2 * VGI_PARTS + part) * piece(b, 2 * VGI_PARTS + part);
+    vgi_wide sum = row_piece(a, part) * row_piece(b, part);
+    sum += row_piece(a, VGI_PARTS + part) * row_piece(b, VGI_PARTS + part);
+    return sum + row_piece(a, 2 * VGI_PARTS + part) * row_piece(b, 2 * VGI_PARTS + part);
 }
 
 /* One face: m.t_c is h_c = m.p_c minus their mean. It adds (m.t_c) m to y_c, because the matrix from v to t is a
@@ -39,12 +39,12 @@ VGI_INLINE void face_part(const uint32_t *row, size_t corners, const vgi_row *m,
         vgi_wide t = h[c] - mean;
         vgi_row *to = &y[row[c]];
 #pragma GCC unroll 3
-        for (size_t k = part; k < PIECES; k += VGI_PARTS) put(to, k, piece(to, k) + t * piece(m, k));
+        for (size_t k = part; k < PIECES; k += VGI_PARTS) put_piece(to, k, row_piece(to, k) + t * row_piece(m, k));
         *sum += t * t;
     }
 }
 
-static void product(const vgi_planar_faces *f, const vgi_row *normals, const vgi_row *p, vgi_row *y, vgi_lanes *room,
+static void planar_product(const vgi_planar_faces *f, const vgi_row *normals, const vgi_row *p, vgi_row *y, vgi_lanes *room,
                     vgi_lanes pPp)
 {
     vgi_wide sum[VGI_PARTS] = {{0}}, *h = (vgi_wide *)(void *)room;
@@ -67,7 +67,7 @@ VGI_INLINE void load_lanes(const vgi_lanes x, vgi_wide *to)
     for (size_t part = 0; part < VGI_PARTS; part++) to[part] = vgi_load(x + part * VGI_WIDTH);
 }
 
-static void turn(size_t n, const vgi_row *z, const vgi_row *r, const vgi_lanes beta, vgi_row *p, vgi_row *s,
+static void turn_direction(size_t n, const vgi_row *z, const vgi_row *r, const vgi_lanes beta, vgi_row *p, vgi_row *s,
                  vgi_lanes ps)
 {
     vgi_wide b[VGI_PARTS], sum[VGI_PARTS] = {{0}};
@@ -75,15 +75,15 @@ static void turn(size_t n, const vgi_row *z, const vgi_row *r, const vgi_lanes b
     for (size_t i = 0; i < n; i++)
 #pragma GCC unroll 12
         for (size_t k = 0; k < PIECES; k++) {
-            vgi_wide pk = piece(&z[i], k) + b[k % VGI_PARTS] * piece(&p[i], k);
-            vgi_wide sk = piece(&r[i], k) + b[k % VGI_PARTS] * piece(&s[i], k);
-            put(&p[i], k, pk), put(&s[i], k, sk);
+            vgi_wide pk = row_piece(&z[i], k) + b[k % VGI_PARTS] * row_piece(&p[i], k);
+            vgi_wide sk = row_piece(&r[i], k) + b[k % VGI_PARTS] * row_piece(&s[i], k);
+            put_piece(&p[i], k, pk), put_piece(&s[i], k, sk);
             sum[k % VGI_PARTS] += pk * sk;
         }
     for (size_t part = 0; part < VGI_PARTS; part++) vgi_store(ps + part * VGI_WIDTH, sum[part]);
 }
 
-static void advance(size_t n, const vgi_lanes alpha, const vgi_lanes gamma, const vgi_row *p, const vgi_row *s,
+static void advance_rows(size_t n, const vgi_lanes alpha, const vgi_lanes gamma, const vgi_row *p, const vgi_row *s,
                     vgi_row *y, vgi_row *x, vgi_row *r, vgi_row *z)
 {
     vgi_wide a[VGI_PARTS], g[VGI_PARTS];
@@ -93,13 +93,13 @@ static void advance(size_t n, const vgi_lanes alpha, const vgi_lanes gamma, cons
 #pragma GCC unroll 12
         for (size_t k = 0; k < PIECES; k++) {
             size_t part = k % VGI_PARTS;
-            vgi_wide left = piece(&r[i], k) - (a[part] * piece(&s[i], k) + g[part] * piece(&y[i], k));
-            put(&x[i], k, piece(&x[i], k) + a[part] * piece(&p[i], k));
-            put(&r[i], k, left), put(&z[i], k, left), put(&y[i], k, vgi_same(0));
+            vgi_wide left = row_piece(&r[i], k) - (a[part] * row_piece(&s[i], k) + g[part] * row_piece(&y[i], k));
+            put_piece(&x[i], k, row_piece(&x[i], k) + a[part] * row_piece(&p[i], k));
+            put_piece(&r[i], k, left), put_piece(&z[i], k, left), put_piece(&y[i], k, vgi_same(0));
         }
 }
 
-static void dot(size_t n, const vgi_row *a, const vgi_row *b, vgi_lanes ab)
+static void dot_rows(size_t n, const vgi_row *a, const vgi_row *b, vgi_lanes ab)
 {
     vgi_wide sum[VGI_PARTS] = {{0}};
     for (size_t i = 0; i < n; i++)
@@ -114,19 +114,19 @@ static void largest(size_t n, const vgi_row *a, vgi_lanes most)
     for (size_t i = 0; i < n; i++)
 #pragma GCC unroll 12
         for (size_t k = 0; k < PIECES; k++) {
-            vgi_wide x = vgi_absolute(piece(&a[i], k)), *to = &now[k % VGI_PARTS];
+            vgi_wide x = vgi_absolute(row_piece(&a[i], k)), *to = &now[k % VGI_PARTS];
             *to = vgi_either(x > *to, x, *to);
         }
     for (size_t part = 0; part < VGI_PARTS; part++) vgi_store(most + part * VGI_WIDTH, now[part]);
 }
 
-static void scale(size_t n, const vgi_lanes factor, const vgi_row *a, vgi_row *to)
+static void scale_rows(size_t n, const vgi_lanes factor, const vgi_row *a, vgi_row *to)
 {
     vgi_wide f[VGI_PARTS];
     load_lanes(factor, f);
     for (size_t i = 0; i < n; i++)
 #pragma GCC unroll 12
-        for (size_t k = 0; k < PIECES; k++) put(&to[i], k, f[k % VGI_PARTS] * piece(&a[i], k));
+        for (size_t k = 0; k < PIECES; k++) put_piece(&to[i], k, f[k % VGI_PARTS] * row_piece(&a[i], k));
 }
 
-const vgi_planar_kernel VGI_OF_SET(vgi_planar_kernel) = {product, turn, advance, dot, largest, scale};
+const vgi_planar_kernel VGI_OF_SET(vgi_planar_kernel) = {planar_product, turn_direction, advance_rows, dot_rows, largest, scale_rows};

@@ -101,7 +101,7 @@ static int walk_from_held(vg_solver *s, const vgi_incidence *around, vg_err *e)
     }
     if (r == VG_OK && tail < g->attached)
         r = vg_fail(e, VG_EINPUT,
-                    "the vectors leave %zu vertices in pieces that nothing joins to the rest: a link is missing",
+                    "%zu vertices are in components that no link joins to the others: a link is missing",
                     g->attached - tail);
     free(reached);
     free(used);
@@ -173,7 +173,7 @@ static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
     return r;
 }
 
-static int factorize(vg_solver *s, vg_err *e)
+static int factorize_solver(vg_solver *s, vg_err *e)
 {
     int r = assemble(s, &s->matrix, e);
     if (r < 0) return r;
@@ -245,7 +245,7 @@ int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, s
     if (r == VG_OK) r = plan_walk(s, e);
     if (r == VG_OK) r = make_spare(s, e);
     if (r == VG_OK && s->unknowns) {
-        r = factorize(s, e);
+        r = factorize_solver(s, e);
         if (r == VG_OK) r = permute_rows(s, e);
         if (r == VG_OK) r = make_workspace(s, e);
     }
@@ -321,7 +321,7 @@ static void load_share(void *context, size_t task)
     }
 }
 
-static void load(const vg_solver *s, vg_solver *const *each, size_t n, const double *const *vectors,
+static void load_poses(const vg_solver *s, vg_solver *const *each, size_t n, const double *const *vectors,
                  const double *const *anchors, double *const *x, double *const *rhs)
 {
     size_t tasks = (size_t)s->threads < n ? (size_t)s->threads : n;
@@ -332,13 +332,13 @@ static void load(const vg_solver *s, vg_solver *const *each, size_t n, const dou
 void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors,
                     double *const *x, double *const *rhs)
 {
-    load(s, NULL, n, vectors, anchors, x, rhs);
+    load_poses(s, NULL, n, vectors, anchors, x, rhs);
 }
 
 void vg_solver_load_each(size_t n, vg_solver *const *each, const double *const *vectors, const double *const *anchors,
                          double *const *x, double *const *rhs)
 {
-    if (n) load(each[0], each, n, vectors, anchors, x, rhs);
+    if (n) load_poses(each[0], each, n, vectors, anchors, x, rhs);
 }
 
 typedef struct solve_job {

@@ -137,7 +137,7 @@ static int make_rooms(vg_robust *b, size_t blocks, vg_err *e)
 int vg_robust_new(vg_robust **out, const vg_solver *s, size_t rounds, double eps, vg_err *e)
 {
     *out = NULL;
-    if (!(eps > 0) || !isfinite(eps)) return vg_fail(e, VG_EARG, "eps is a number above 0, not %g", eps);
+    if (!(eps > 0) || !isfinite(eps)) return vg_fail(e, VG_EARG, "eps must be above 0, not %g", eps);
     vg_robust *b = *out = vgi_array(1, sizeof *b, e);
     if (!b) return VG_ENOMEM;
     b->s = s, b->solver = vgi_solver_look(s), b->rounds = rounds, b->eps = eps;
@@ -241,7 +241,7 @@ static bool any_active(const search *s)
 }
 
 /* Energy and gradient with the vertices displaced by u. */
-static void look(const search *s, const vgi_row *u, vgi_row *g, vgi_robust_sums *sums)
+static void evaluate_energy(const search *s, const vgi_row *u, vgi_row *g, vgi_robust_sums *sums)
 {
     memset(g, 0, (s->r->solver.rows + s->r->rows.nheld) * sizeof *g);
     vgi_robust_kernel_now()->energy(&s->faces, s->m.misfit, u, s->soft2, g, s->m.corners, sums);
@@ -280,13 +280,13 @@ static void choose_softness(search *s)
     }
 }
 
-static void begin(search *s)
+static void begin_search(search *s)
 {
     size_t n = s->r->moved;
     vgi_robust_sums sums;
     vgi_robust_products p;
     vgi_lanes abc[3] = {{0}};
-    look(s, s->m.u, s->m.g, &sums);
+    evaluate_energy(s, s->m.u, s->m.g, &sums);
     precondition(s, s->active, s->m.g, s->m.z);
     vgi_robust_kernel_now()->multiply(n, s->m.g, s->m.g, s->m.z, s->m.z, s->m.z, &p);
     for (int k = 0; k < VGI_LANES; k++) {
@@ -302,25 +302,25 @@ static void begin(search *s)
 
 /* Step length at the minimum of the parabola through the energies at both ends and the slope at the first, kept away
  * from both ends. */
-static double shorter(double t, double slope, double rise)
+static double shorter_step(double t, double slope, double rise)
 {
     double least = -slope * t * t / (2 * (rise - slope * t));
     return least > 0.1 * t && least < 0.5 * t ? least : least >= 0.5 * t ? 0.5 * t : 0.1 * t;
 }
 
 /* u := u + t d with sufficient decrease of the energy. A pose for which no such t is found is done. */
-static void advance(search *s, vgi_robust_sums *sums)
+static void line_search(search *s, vgi_robust_sums *sums)
 {
     size_t n = s->r->moved;
     for (int tries = 0;; tries++) {
         bool again = false;
         vgi_robust_kernel_now()->step(n, s->m.u, s->t, s->m.d, s->m.trial);
-        look(s, s->m.trial, s->m.gn, sums);
+        evaluate_energy(s, s->m.trial, s->m.gn, sums);
         for (int k = 0; k < VGI_LANES; k++) {
             double rise = sums->energy[k] - s->energy[k];
             if (!s->active[k] || rise <= sufficient * s->t[k] * s->slope[k]) continue;
             if (tries == HALVINGS) s->t[k] = 0, s->active[k] = s->falling[k] = false;
-            else s->t[k] = shorter(s->t[k], s->slope[k], rise);
+            else s->t[k] = shorter_step(s->t[k], s->slope[k], rise);
             again = true;
         }
         if (!again) break;
@@ -329,7 +329,7 @@ static void advance(search *s, vgi_robust_sums *sums)
     s->m.u = s->m.trial, s->m.trial = u;
 }
 
-static void judge(search *s, const vgi_robust_sums *sums)
+static void judge_round(search *s, const vgi_robust_sums *sums)
 {
     s->rounds++;
     for (int k = 0; k < VGI_LANES; k++) {
@@ -365,15 +365,15 @@ static void choose_direction(search *s)
     s->m.g = s->m.gn, s->m.gn = g, s->m.z = s->m.zn, s->m.zn = z;
 }
 
-static void descend(search *s)
+static void run_search(search *s)
 {
     vgi_robust_sums sums;
     choose_softness(s);
     if (!any_active(s) || !s->r->rounds) return;
-    begin(s);
+    begin_search(s);
     for (;;) {
-        advance(s, &sums);
-        judge(s, &sums);
+        line_search(s, &sums);
+        judge_round(s, &sums);
         if (!any_active(s) || s->rounds == s->r->rounds) return;
         precondition(s, s->active, s->m.gn, s->m.zn);
         choose_direction(s);
@@ -453,7 +453,7 @@ static void robust_block(void *context, size_t i)
     choose_solvers(j, &s, first);
     if (b->moved) {
         solve_plainly(j, &s, first, size);
-        descend(&s);
+        run_search(&s);
         vgi_robust_kernel_now()->scale(b->moved, size, s.m.u);
         add_rows(&s, j->x + first);
     }

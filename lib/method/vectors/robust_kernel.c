@@ -14,19 +14,19 @@ typedef struct point {
     vgi_wide at[3];
 } point;
 
-VGI_INLINE vgi_wide piece(const vgi_row *x, int k, size_t part)
+VGI_INLINE vgi_wide row_piece(const vgi_row *x, int k, size_t part)
 {
     return vgi_load(x->xyz[k] + part * VGI_WIDTH);
 }
 
-VGI_INLINE void put(vgi_row *x, int k, size_t part, vgi_wide value)
+VGI_INLINE void put_piece(vgi_row *x, int k, size_t part, vgi_wide value)
 {
     vgi_store(x->xyz[k] + part * VGI_WIDTH, value);
 }
 
-VGI_INLINE point load(const vgi_row *x, size_t part)
+VGI_INLINE point load_point(const vgi_row *x, size_t part)
 {
-    return (point){{piece(x, 0, part), piece(x, 1, part), piece(x, 2, part)}};
+    return (point){{row_piece(x, 0, part), row_piece(x, 1, part), row_piece(x, 2, part)}};
 }
 
 VGI_INLINE point load_misfit(const float *m, size_t part)
@@ -39,11 +39,11 @@ VGI_INLINE point load_misfit(const float *m, size_t part)
 VGI_INLINE void add_to(vgi_row *x, size_t part, vgi_wide w, const point *a)
 {
 #pragma GCC unroll 3
-    for (int k = 0; k < 3; k++) put(x, k, part, piece(x, k, part) + w * a->at[k]);
+    for (int k = 0; k < 3; k++) put_piece(x, k, part, row_piece(x, k, part) + w * a->at[k]);
 }
 
 /* q = M e, M the metric of r - 1 corners. */
-VGI_INLINE void weigh(const double *metric, size_t n, const point *e, point *q)
+VGI_INLINE void weigh_misfits(const double *metric, size_t n, const point *e, point *q)
 {
     for (size_t i = 0; i < n; i++) q[i] = (point){{{0}}};
     for (size_t i = 0; i < n; i++) {
@@ -83,15 +83,15 @@ VGI_INLINE void face(const face_job *j, size_t f, size_t n, size_t i, point *e, 
     const uint32_t *row = j->f->row + j->f->start[f];
     const float *misfit = j->misfit + 3 * VGI_LANES * (j->f->start[f] - f);
     const double *metric = j->f->metric + j->f->entry[f];
-    point first = load(&j->u[row[0]], i), sum = {{{0}}};
+    point first = load_point(&j->u[row[0]], i), sum = {{{0}}};
     for (size_t c = 0; c < n; c++) {
-        point to = load(&j->u[row[c + 1]], i);
+        point to = load_point(&j->u[row[c + 1]], i);
         e[c] = load_misfit(misfit + 3 * VGI_LANES * c, i);
 #pragma GCC unroll 3
         for (int k = 0; k < 3; k++) e[c].at[k] += to.at[k] - first.at[k];
     }
     if (j->f->star[f]) weigh_star(*metric, n, e, q);
-    else weigh(metric, n, e, q);
+    else weigh_misfits(metric, n, e, q);
     vgi_wide square = vgi_same(0);
     for (size_t c = 0; c < n; c++) square += vgi_wide_dot(e[c].at, q[c].at);
     if (!j->soft2) {
@@ -129,7 +129,7 @@ static void energy(const vgi_robust_faces *f, const float *misfit, const vgi_row
     }
 }
 
-static void multiply(size_t n, const vgi_row *g, const vgi_row *gn, const vgi_row *z, const vgi_row *zn,
+static void direction_products(size_t n, const vgi_row *g, const vgi_row *gn, const vgi_row *z, const vgi_row *zn,
                      const vgi_row *d, vgi_robust_products *p)
 {
     for (size_t part = 0; part < VGI_PARTS; part++) {
@@ -137,8 +137,8 @@ static void multiply(size_t n, const vgi_row *g, const vgi_row *gn, const vgi_ro
         for (size_t r = 0; r < n; r++)
 #pragma GCC unroll 3
             for (int k = 0; k < 3; k++) {
-                vgi_wide gnow = piece(&gn[r], k, part), znow = piece(&zn[r], k, part), way = piece(&d[r], k, part);
-                vgi_wide y = gnow - piece(&g[r], k, part), v = znow - piece(&z[r], k, part);
+                vgi_wide gnow = row_piece(&gn[r], k, part), znow = row_piece(&zn[r], k, part), way = row_piece(&d[r], k, part);
+                vgi_wide y = gnow - row_piece(&g[r], k, part), v = znow - row_piece(&z[r], k, part);
                 dy += way * y, yv += y * v, dg += way * gnow, yz += y * znow, gz += gnow * znow;
             }
         vgi_store(p->dy + part * VGI_WIDTH, dy), vgi_store(p->yv + part * VGI_WIDTH, yv);
@@ -147,7 +147,7 @@ static void multiply(size_t n, const vgi_row *g, const vgi_row *gn, const vgi_ro
     }
 }
 
-static void turn(size_t n, const vgi_lanes *abc, const vgi_row *z, const vgi_row *zn, vgi_row *d)
+static void turn_direction(size_t n, const vgi_lanes *abc, const vgi_row *z, const vgi_row *zn, vgi_row *d)
 {
     for (size_t r = 0; r < n; r++)
 #pragma GCC unroll 4
@@ -156,27 +156,27 @@ static void turn(size_t n, const vgi_lanes *abc, const vgi_row *z, const vgi_row
             vgi_wide c = vgi_load(abc[2] + part * VGI_WIDTH);
 #pragma GCC unroll 3
             for (int k = 0; k < 3; k++)
-                put(&d[r], k, part, a * piece(&d[r], k, part) + b * piece(&z[r], k, part) + c * piece(&zn[r], k, part));
+                put_piece(&d[r], k, part, a * row_piece(&d[r], k, part) + b * row_piece(&z[r], k, part) + c * row_piece(&zn[r], k, part));
         }
 }
 
-static void step(size_t n, const vgi_row *u, const vgi_lanes t, const vgi_row *d, vgi_row *to)
+static void step_rows(size_t n, const vgi_row *u, const vgi_lanes t, const vgi_row *d, vgi_row *to)
 {
     for (size_t r = 0; r < n; r++)
 #pragma GCC unroll 4
         for (size_t part = 0; part < VGI_PARTS; part++)
 #pragma GCC unroll 3
             for (int k = 0; k < 3; k++)
-                put(&to[r], k, part, piece(&u[r], k, part) + vgi_load(t + part * VGI_WIDTH) * piece(&d[r], k, part));
+                put_piece(&to[r], k, part, row_piece(&u[r], k, part) + vgi_load(t + part * VGI_WIDTH) * row_piece(&d[r], k, part));
 }
 
-static void scale(size_t n, const vgi_lanes factor, vgi_row *x)
+static void scale_rows(size_t n, const vgi_lanes factor, vgi_row *x)
 {
     for (size_t r = 0; r < n; r++)
 #pragma GCC unroll 4
         for (size_t part = 0; part < VGI_PARTS; part++)
 #pragma GCC unroll 3
-            for (int k = 0; k < 3; k++) put(&x[r], k, part, vgi_load(factor + part * VGI_WIDTH) * piece(&x[r], k, part));
+            for (int k = 0; k < 3; k++) put_piece(&x[r], k, part, vgi_load(factor + part * VGI_WIDTH) * row_piece(&x[r], k, part));
 }
 
 static void interleave(size_t n, const float *const *from, float *to)
@@ -185,4 +185,4 @@ static void interleave(size_t n, const float *const *from, float *to)
         for (size_t k = 0; k < VGI_LANES; k++) to[VGI_LANES * i + k] = from[k][i];
 }
 
-const vgi_robust_kernel VGI_OF_SET(vgi_robust_kernel) = {interleave, energy, multiply, turn, step, scale};
+const vgi_robust_kernel VGI_OF_SET(vgi_robust_kernel) = {interleave, energy, direction_products, turn_direction, step_rows, scale_rows};

@@ -15,7 +15,7 @@ struct selection {
     uint32_t *sets;  /* per vertex: sets joined by chosen faces */
 };
 
-static int prepare(struct selection *s, const vg_mesh *m, vg_err *e)
+static int prepare_selection(struct selection *s, const vg_mesh *m, vg_err *e)
 {
     s->m = m;
     int r = vgi_incidence_make(&s->around, m, e);
@@ -29,7 +29,7 @@ static int prepare(struct selection *s, const vg_mesh *m, vg_err *e)
     return VG_OK;
 }
 
-static void clear(struct selection *s)
+static void clear_selection(struct selection *s)
 {
     vgi_incidence_clear(&s->around);
     free(s->chosen);
@@ -70,7 +70,7 @@ static bool join_face(struct selection *s, size_t f)
 
 /* Add faces until every component is connected. A vertex without chosen faces is a set by itself until a face joins
  * it, so this also covers all vertices. */
-static void complete(struct selection *s)
+static void complete_selection(struct selection *s)
 {
     for (size_t f = 0; f < s->m->nf; f++)
         if (s->chosen[f]) join_face(s, f);
@@ -97,12 +97,12 @@ int vg_select_faces(const vg_mesh *m, uint32_t **faces, size_t *n, vg_err *e)
     struct selection s = {0};
     *faces = NULL;
     *n = 0;
-    int r = prepare(&s, m, e);
+    int r = prepare_selection(&s, m, e);
     if (r < 0) goto out;
     for (size_t v = 0; v < m->nv; v++) select_around(&s, (uint32_t)v);
-    complete(&s);
+    complete_selection(&s);
     r = list_chosen(&s, faces, n, e);
 out:
-    clear(&s);
+    clear_selection(&s);
     return r;
 }

@@ -87,7 +87,7 @@ typedef struct choice {
 } choice;
 
 /* Add to a sum of quaternions, with the sign that agrees with the sum. */
-static void add(double sum[4], const double q[4])
+static void add_quaternion(double sum[4], const double q[4])
 {
     double along = 0;
     for (int k = 0; k < 4; k++) along += sum[k] * q[k];
@@ -111,21 +111,21 @@ static void make_means(choice *c, const double *corner)
             double unit[4];
             memcpy(unit, corner + 4 * i, sizeof unit);
             make_unit(unit);
-            add(mean, unit);
+            add_quaternion(mean, unit);
         }
         make_unit(mean);
     }
     for (size_t v = 0; v < g->faces.nv; v++) {
         double *mean = c->q + 4 * (g->faces.nf + v);
         for (size_t i = c->around.first[v]; i < c->around.first[v + 1]; i++)
-            add(mean, c->q + 4 * (size_t)c->around.face[i]);
+            add_quaternion(mean, c->q + 4 * (size_t)c->around.face[i]);
         make_unit(mean);
     }
 }
 
 /* ---- the tree (Prim 1957) ---- */
 
-static bool before(const edge *a, const edge *b)
+static bool edge_before(const edge *a, const edge *b)
 {
     return a->cost < b->cost || (a->cost == b->cost && (a->to < b->to || (a->to == b->to && a->from < b->from)));
 }
@@ -138,7 +138,7 @@ static int push(choice *c, size_t from, size_t to, vg_err *e)
     edge it = {1 - fabs(along), (uint32_t)from, (uint32_t)to};
     if (vgi_grow(&c->heap, &c->cap, c->n + 1, sizeof *c->heap, e) < 0) return VG_ENOMEM;
     size_t i = c->n++;
-    for (; i > 0 && before(&it, &c->heap[(i - 1) / 2]); i = (i - 1) / 2) c->heap[i] = c->heap[(i - 1) / 2];
+    for (; i > 0 && edge_before(&it, &c->heap[(i - 1) / 2]); i = (i - 1) / 2) c->heap[i] = c->heap[(i - 1) / 2];
     c->heap[i] = it;
     return VG_OK;
 }
@@ -148,8 +148,8 @@ static edge pop(choice *c)
     edge top = c->heap[0], last = c->heap[--c->n];
     size_t i = 0, child;
     while ((child = 2 * i + 1) < c->n) {
-        if (child + 1 < c->n && before(&c->heap[child + 1], &c->heap[child])) child++;
-        if (!before(&c->heap[child], &last)) break;
+        if (child + 1 < c->n && edge_before(&c->heap[child + 1], &c->heap[child])) child++;
+        if (!edge_before(&c->heap[child], &last)) break;
         c->heap[i] = c->heap[child];
         i = child;
     }
@@ -253,7 +253,7 @@ static bool mean_beside(const choice *c, size_t f, double mean[3])
 
 /* Move each face to the branch with the least sum of squared differences from its neighbours, which is the one
  * nearest to their mean. Returns the number of changes. */
-static size_t sweep(choice *c)
+static size_t sweep_branches(choice *c)
 {
     const vg_graph *g = c->g;
     size_t changed = 0;
@@ -337,7 +337,7 @@ static void add_laplacian(choice *c, const double *x, double *y)
 }
 
 /* y = J' W rest. W is `weight` along the axis, which J preserves, and `sideways` times that perpendicular to it. */
-static void pull(const relaxation *r, size_t f, const double rest[3], double y[3])
+static void pull_face(const relaxation *r, size_t f, const double rest[3], double y[3])
 {
     const double *J = r->J + 9 * f, *axis = r->axis + 3 * f;
     double along = (1 - sideways) * vgi_dot(axis, rest);
@@ -346,12 +346,12 @@ static void pull(const relaxation *r, size_t f, const double rest[3], double y[3
 }
 
 /* y = J' W (J x) + L x */
-static void apply(choice *c, const relaxation *r, const double *x, double *y)
+static void apply_system(choice *c, const relaxation *r, const double *x, double *y)
 {
     for (size_t f = 0; f < c->g->faces.nf; f++) {
         const double *J = r->J + 9 * f, *xf = x + 3 * f;
         const double Jx[3] = {vgi_dot(J, xf), vgi_dot(J + 3, xf), vgi_dot(J + 6, xf)};
-        pull(r, f, Jx, y + 3 * f);
+        pull_face(r, f, Jx, y + 3 * f);
     }
     add_laplacian(c, x, y);
 }
@@ -373,7 +373,7 @@ static void linearise(choice *c, relaxation *r)
         double y[3];
         memcpy(r->axis + 3 * f, turn, 3 * sizeof *turn);
         vgi_make_unit(r->axis + 3 * f);
-        pull(r, f, l + 1, y);
+        pull_face(r, f, l + 1, y);
         vgi_subtract(y, b, b);
     }
 }
@@ -386,7 +386,7 @@ static void solve_step(choice *c, relaxation *r)
     memcpy(r->p, r->b, n * sizeof *r->b);
     double rr = vgi_inner(r->r, r->r, n), enough = 1e-4 * rr;
     for (int i = 0; i < CG_STEPS && rr > enough; i++) {
-        apply(c, r, r->p, r->Ap);
+        apply_system(c, r, r->p, r->Ap);
         double alpha = rr / vgi_inner(r->p, r->Ap, n), before_rr = rr;
         for (size_t k = 0; k < n; k++) r->x[k] += alpha * r->p[k], r->r[k] -= alpha * r->Ap[k];
         rr = vgi_inner(r->r, r->r, n);
@@ -435,7 +435,7 @@ int vgi_choose_turns(const vg_graph *g, const double *q, double *turn, bool *bey
     }
     if (r == VG_OK) {
         sum_around(&c);
-        for (int i = 0; i < SWEEPS && sweep(&c); i++) continue;
+        for (int i = 0; i < SWEEPS && sweep_branches(&c); i++) continue;
         *beyond = is_beyond(&c, q);
         if (*beyond) r = relax(&c, e);
     }
