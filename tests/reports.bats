@@ -162,7 +162,7 @@ EOF
     done
     must_fail 3 vg-encode unclear.npz -o out.vgs
     one_line
-    says "'vertices'" "cannot be told apart" "--array-axes"
+    says "'vertices'" "ambiguous axes" "--array-axes"
     must vg-encode --array-axes vxf unclear.npz -o out.vgs
     pipe 'vg-info out.vgs'
     shows 'frames     2' 'vertices    4'
@@ -337,7 +337,7 @@ json.dump(g, open('meshopt.gltf', 'w'))
 EOF
     must_warn vg-encode used.gltf -o out.vgs
     one_line
-    says "VENDOR_bend" "not known"
+    says "VENDOR_bend" "unknown and ignored"
     [[ $stderr != *unlit* ]] || fail "$stderr"
     must_fail 3 vg-encode required.gltf -o no.vgs
     says "requires the extension 'VENDOR_bend'"

@@ -332,7 +332,7 @@ PY
     says "has no 'error' to colour"
     must vg-diff -c truth off --heat centred.vgs -o report
     must_fail 3 vg-view off.vgs --beside centred.vgs -o mixed.png
-    says "brings 'centred error' in 'D'"
+    says "has 'centred error' in 'D'"
     must_fail 3 vg-view off --against truth --beside mixed.vgs -o mixed.png
     says "'mixed.vgs' has 8 frames where 'truth' has 4"
     [ ! -e mixed.png ]

@@ -602,7 +602,7 @@ static void says_what_is_lost(void)
     free(text);
     vg_skeleton_clear(&s.head.body.skeleton);
     CHECK(!write_text(&s, false, warning, &e) &&
-          strstr(e.message, "cannot write 't.bvh': the input holds no skeleton"));
+          strstr(e.message, "cannot write 't.bvh': the input has no skeleton"));
     clear(&s);
 }
 
