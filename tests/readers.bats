@@ -162,6 +162,20 @@ EOF
         '0 0 0 0 0 1 0 0 255 0 0' '1 0 0 0 0 1 1 0 255 0 0' '0 1 0 0 0 1 0 1 255 0 0' '3 0 1 2' >blender.ply
     geometry blender.ply
     [ "$output" = $'0 0 0\n1 0 0\n0 1 0\n3 0 1 2' ] || fail "$output"
+    must_warn vg-encode blender.ply -o out.vgs
+    one_line
+    says "left out the colours of its vertices"
+}
+
+@test "OBJ: colours behind the coordinates of vertices are left out with a word, a fourth coordinate without" {
+    printf 'v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 1 2 3\n' >colours.obj
+    must_warn vg-encode colours.obj -o out.vgs
+    one_line
+    says "left out the colours of its vertices"
+    geometry colours.obj
+    [ "$(tail -1 <<<"$output")" = '3 0 1 2' ] || fail "$output"
+    printf 'v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n' >weights.obj
+    must vg-encode weights.obj -o out.vgs
 }
 
 @test "STL: text behind the last solid, several solids, less and more than a triangle behind the last" {

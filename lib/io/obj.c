@@ -22,6 +22,7 @@ struct reading {
     size_t sought_face; /* find_face: stop after this face ... */
     const char *found;  /* ... and store the position of its statement */
     size_t bad_tex;     /* number of malformed texture coordinates */
+    bool coloured;      /* vertices have colours, which are left out */
 };
 
 static size_t line_of(const struct reading *in, const char *p)
@@ -109,13 +110,19 @@ static inline bool ends_word(const struct reading *in, const char *p)
     return is_line_end(in, p) || *p == ' ' || *p == '\t' || *p == '\r' || *p == '\\';
 }
 
-/* Skip words up to the end of the statement or a comment. */
-static const char *skip_words(const struct reading *in, const char *p)
+/* Skip words up to the end of the statement or a comment, and count them. */
+static const char *count_words(const struct reading *in, const char *p, size_t *n)
 {
-    for (p = skip_blanks(in, p); !at_end(in, p); p = skip_blanks(in, p))
+    for (p = skip_blanks(in, p), *n = 0; !at_end(in, p); p = skip_blanks(in, p), ++*n)
         do p++;
         while (!ends_word(in, p));
     return p;
+}
+
+static const char *skip_words(const struct reading *in, const char *p)
+{
+    size_t n;
+    return count_words(in, p, &n);
 }
 
 /* Whether the word at p equals `word`. */
@@ -175,7 +182,10 @@ static const char *read_vertex(struct reading *in, const char *p)
         p = read_coordinate(in, p, to + k);
     }
     if (!p) return NULL;
-    return skip_words(in, p);
+    size_t more;
+    p = count_words(in, p, &more);
+    in->coloured |= more >= 3; /* x y z, perhaps w, r g b */
+    return p;
 }
 
 /* One to three finite numbers and nothing else; returns their number, or 0. */
@@ -550,6 +560,7 @@ int vgi_obj_read(vg_model *m, const char *data, size_t n, const char *subject, v
     int r = read_statements(&in);
     if (r < 0) return r;
     if (m->mesh.nv == 0) return vg_fail(e, VG_EINPUT, "%s has no vertices (no line 'v x y z')", subject);
+    if (in.coloured) vgi_note(&m->note, "left out the colours of its vertices");
     r = check_vertices(&in);
     return r == VG_OK ? finish_tex(&in) : r;
 }

@@ -40,7 +40,7 @@ struct reading {
     struct property *properties;
     size_t nproperties, properties_cap;
     size_t start_cap, vert_cap, corners;
-    bool has_vertices;
+    bool has_vertices, coloured; /* coloured: its vertices have colours, which are left out */
 };
 
 struct word {
@@ -158,6 +158,7 @@ static int read_property_line(struct reading *in, const struct word *words, size
         return vg_fail(in->e, VG_EINPUT, "%s: the PLY header has a property before any element", in->subject);
     struct word type = words[list ? 3 : 1], name = words[list ? 4 : 2];
     struct element *el = &in->elements[in->nelements - 1];
+    if (el->kind == VERTEX && word_is(name, "red")) in->coloured = true;
     struct property p = {list ? type_named(words[2]) : NO_TYPE, type_named(type), role_named(el->kind, name, list)};
     if (p.item == NO_TYPE || (list && p.count == NO_TYPE))
         return vg_fail(in->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", in->subject, shown_length(name),
@@ -214,6 +215,7 @@ static int read_header(struct reading *in)
         if (r < 0) return r;
     }
     if (strange) vgi_note(&in->m->note, "left out %zu meaningless lines of the PLY header", strange);
+    if (in->coloured) vgi_note(&in->m->note, "left out the colours of its vertices");
     if (!formatted) return vg_fail(in->e, VG_EINPUT, "%s: the PLY header has no format line", in->subject);
     for (size_t i = 0; i < in->nelements; i++) {
         int r = finish_element(in, &in->elements[i]);
