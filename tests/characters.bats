@@ -110,6 +110,7 @@ END
     command -v node >/dev/null || skip "node is not installed"
     node -e 'require("three")' 2>/dev/null || skip "the node module three is not installed"
     make_in
+    # shellcheck disable=SC2086 # lists of folders
     find ${NODE_PATH//:/ } ${VG_SAMPLES:-} -name '*.gl[bt]*' -size -1500k 2>/dev/null | grep -E '\.(glb|gltf)$' | sort >samples
     printf '%s\n' "$PWD/in.glb" "$DATA/character-draco.glb" >>samples
     local file

@@ -20,9 +20,9 @@ typedef struct vgi_solver_view {
 vgi_solver_view vgi_solver_look(const vg_solver *s);
 /* vgi_solver_is_star: whether the centroid of face f is a separate unknown. Its metric is then the weight alone. */
 bool vgi_solver_is_star(const vg_solver *s, size_t f);
-/* vgi_solver_place: translate a pose so that its first anchor is at `anchor`, or its mean at `root`; set anchors and
- * isolated vertices. */
-void vgi_solver_place(const vg_solver *s, double *x, const double *anchor, const double *root);
+/* vgi_solver_place: translate a pose so that its first anchor is at `to`, or without anchors its mean; set the anchors, to
+ * the positions from `to` on, and isolated vertices. */
+void vgi_solver_place(const vg_solver *s, double *x, const double *to);
 
 /* The faces with at least a given number of corners, sorted by their lowest row for the cache. Held vertices get the
  * rows after those of the factor, in ascending order. */

@@ -239,7 +239,7 @@ static void solve_share(void *context, size_t task)
         const vg_solver *s = j->each ? j->each[i] : j->s;
         vgi_point *points = s->like->sharing->points + task * vgi_solver_all_rows(s->like);
         if (s->unknowns) solve_pose(s, j->rhs[i], j->x[i], points);
-        vgi_solver_place(s, j->x[i], s->nanchors ? j->anchors[i] : NULL, s->nanchors ? NULL : j->roots[i]);
+        vgi_solver_place(s, j->x[i], s->nanchors ? j->anchors[i] : j->roots[i]);
     }
 }
 

@@ -351,17 +351,15 @@ typedef struct solve_job {
 } solve_job;
 
 /* On input the held vertex is at 0. */
-void vgi_solver_place(const vg_solver *s, double *x, const double *anchor, const double *root)
+void vgi_solver_place(const vg_solver *s, double *x, const double *to)
 {
     const vg_graph *g = s->g;
-    double mean[3] = {0, 0, 0};
+    double shift[3], mean[3] = {0, 0, 0};
     if (!s->nanchors) vg_graph_root(g, x, mean);
-    double shift[3];
-    if (s->nanchors) memcpy(shift, anchor, sizeof shift);
-    else vgi_subtract(root, mean, shift);
+    vgi_subtract(to, mean, shift);
     for (size_t v = 0; v < g->faces.nv; v++)
         vgi_add(x + 3 * v, shift);
-    for (size_t i = 0; i < s->nanchors; i++) memcpy(x + 3 * (size_t)s->anchors[i], anchor + 3 * i, 3 * sizeof *x);
+    for (size_t i = 0; i < s->nanchors; i++) memcpy(x + 3 * (size_t)s->anchors[i], to + 3 * i, 3 * sizeof *x);
     for (size_t i = 0; i < s->nisolated; i++)
         memcpy(x + 3 * (size_t)s->isolated[i], s->isolated_at + 3 * i, 3 * sizeof *x);
 }
@@ -382,7 +380,7 @@ static void solve_block(void *context, size_t i)
         vgi_add_rows(x, s->row, s->g->faces.nv, s->unknowns, j->x + first, lanes);
     }
     for (size_t k = first; k < first + lanes; k++)
-        vgi_solver_place(s, j->x[k], s->nanchors ? j->anchors[k] : NULL, s->nanchors ? NULL : j->roots[k]);
+        vgi_solver_place(s, j->x[k], s->nanchors ? j->anchors[k] : j->roots[k]);
 }
 
 static void solve_plainly(vg_solver *s, size_t n, const double *const *rhs, double *const *x,

@@ -462,7 +462,7 @@ static void robust_block(void *context, size_t i)
     for (size_t k = 0; k < lanes; k++) {
         const vg_solver *own = s.other[k] ? s.other[k] : b->s;
         bool held = own->nanchors > 0;
-        vgi_solver_place(own, j->x[first + k], held ? j->anchors[first + k] : NULL, held ? NULL : j->roots[first + k]);
+        vgi_solver_place(own, j->x[first + k], held ? j->anchors[first + k] : j->roots[first + k]);
         found->unfinished += s.falling[k];
     }
 }
