@@ -50,7 +50,7 @@ typedef struct pixels {
 
 static void unit_normal(const vgi_sample *s, float n[3])
 {
-    for (int k = 0; k < 3; k++) n[k] = s->normal[k];
+    n[0] = s->normal[0], n[1] = s->normal[1], n[2] = s->normal[2];
     if (n[2] < 0) n[2] = 0; /* a smooth normal may face away at the outline */
     float size = sqrtf(dot3(n, n));
     if (!(size > 0)) n[0] = n[1] = 0, n[2] = size = 1;
