@@ -3,6 +3,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 load lib.bash
 
+# terminal.py: what programs have shown on a terminal, until all have closed it
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    cat >terminal.py <<'END'
+import os
+def read_terminal(main):
+    shown = b""
+    try:
+        while more := os.read(main, 65536):
+            shown += more
+    except OSError:
+        pass
+    return shown
+END
+}
+
 @test "--progress json: lines of JSON to standard error or a descriptor, with totals where they are known" {
     poses cube 2
     vg-encode pose1.obj pose2.obj -o in.vgs
@@ -41,6 +57,7 @@ END
     mkfifo slow
     cat >feed.py <<'END'
 import os, subprocess, sys, threading, time
+from terminal import read_terminal
 def run(from_pipe):
     """What vg-encode shows on a terminal whose input takes two seconds to come: as standard input, or as a named pipe."""
     main, side = os.openpty()
@@ -59,13 +76,7 @@ def run(from_pipe):
     to.close()
     assert p.wait() == 0
     os.close(side)
-    shown = b""
-    try:
-        while more := os.read(main, 65536):
-            shown += more
-    except OSError:
-        pass
-    return shown
+    return read_terminal(main)
 alone, waiting = run(False), run(True)
 assert b"vg-encode: poses " in alone, alone
 assert b"poses" not in waiting.split(b"\r\033[K")[0] and b"vg-encode: poses 5" not in waiting, waiting
@@ -108,16 +119,12 @@ END
     vg-encode "$DATA/velociraptor-walk.tar.xz" | vg-interpolate 500 | vg-solve -q --fit squares -o walk.vgs
     cat >watch.py <<'END'
 import os, re, subprocess
+from terminal import read_terminal
 def watch(*command):
     main, side = os.openpty()
     p = subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=side)
     os.close(side)
-    shown = b""
-    try:
-        while more := os.read(main, 65536):
-            shown += more
-    except OSError:
-        pass
+    shown = read_terminal(main)
     assert p.wait() == 0
     return shown
 shown = watch("vg-fitsignal", "-j1", "--space", "gradients", "walk.vgs", "-o", "walk.signal")
