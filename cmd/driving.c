@@ -1,4 +1,4 @@
-/* driving.c: --align and --joints of vg-play. lib/method/rig pairs joints by name and aligns limbs.
+/* driving.c: --align and --joints of vg-play and vg-deform. lib/method/rig pairs joints by name and aligns limbs.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "driving.h"
 #include "lines.h"
@@ -100,22 +100,30 @@ static uint32_t *read_pairs(const char *file, const vg_skeleton *of, const vg_sk
     return partner;
 }
 
-vg_driver *driving_start(const driving_options *o, const vg_rig *rig, const char *map, const vg_skeleton *by)
+void driving_start(driving *d, const driving_options *o, const vg_rig *rig, const char *name, const vg_skeleton *by)
 {
     vg_err e;
-    vg_driver *d;
     vg_driver_options how = {.align = VG_ALIGN_AUTO};
     bool *chosen = NULL;
-    uint32_t *partner = o->joints ? read_pairs(o->joints, &rig->skeleton, by) : NULL;
-    read_align(o, &rig->skeleton, map, &how, &chosen);
+    if (vg_skeleton_copy(&d->by, by, &e) < 0 || vg_joint_fitter_new(&d->fitter, &d->by, &e) < 0) cli_die(&e);
+    uint32_t *partner = o->joints ? read_pairs(o->joints, &rig->skeleton, &d->by) : NULL;
+    read_align(o, &rig->skeleton, name, &how, &chosen);
     how.partner = partner;
-    if (vg_driver_new(&d, rig, by, &how, &e) < 0) cli_die(&e);
-    size_t missing = vg_driver_missing(d);
+    if (vg_driver_new(&d->driver, rig, &d->by, &how, &e) < 0) cli_die(&e);
+    size_t missing = vg_driver_missing(d->driver);
     if (missing)
         cli_warn("%zu of %zu bones have no matching joint of the skeleton: they follow their parents",
                  missing, rig->nbones);
-    note_aligned(d, &rig->skeleton, map);
+    note_aligned(d->driver, &rig->skeleton, name);
     free(chosen);
     free(partner);
-    return d;
+}
+
+const double *driving_turns(vg_joint_fitter *fitter, const vg_frame *f)
+{
+    size_t known, joint;
+    const double *turns = vg_frame_turns(f, &known);
+    if (known) return turns;
+    vg_joint_fitter_fit(fitter, f->values, NULL, NULL, &joint);
+    return vg_joint_fitter_turns(fitter);
 }

@@ -1,4 +1,4 @@
-/* driving.h: pairs the joints of a skeleton with those of a rig, and aligns their rest poses, for vg-play.
+/* driving.h: pairs the joints of a skeleton with those of a rig, and aligns their rest poses, for vg-play and vg-deform.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_DRIVING_H
 #define VG_DRIVING_H
@@ -10,8 +10,18 @@ typedef struct driving_options {
     const char *joints; /* a file of pairs of joints; NULL: by their names */
 } driving_options;
 
-/* driving_start: create the driver of a map's rig by a skeleton (both borrowed); warns of limbs it aligned and
- * bones without a partner. Messages call the map by its operand `map`. */
-vg_driver *driving_start(const driving_options *o, const vg_rig *rig, const char *map, const vg_skeleton *by);
+/* A skeleton that drives a rig. Lives until the program ends. */
+typedef struct driving {
+    vg_skeleton by;
+    vg_joint_fitter *fitter; /* for frames that do not say how joints have turned */
+    vg_driver *driver;       /* NULL: not started */
+} driving;
+
+/* driving_start: drive a rig (borrowed) by a skeleton (copied); warns of limbs it aligned and bones without a partner.
+ * Messages call the rig `name`. */
+void driving_start(driving *d, const driving_options *o, const vg_rig *rig, const char *name, const vg_skeleton *by);
+/* driving_turns: the rotations of the joints in a frame: those it has, or fitted to the positions. Borrowed until the next
+ * call. */
+const double *driving_turns(vg_joint_fitter *fitter, const vg_frame *f);
 
 #endif

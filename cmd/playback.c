@@ -26,9 +26,7 @@ typedef struct playback {
     vg_kind kind; /* what comes in */
     size_t count; /* transforms */
     vg_player *player;
-    vg_driver *driver;       /* a skeleton comes in */
-    vg_joint_fitter *fitter; /* for frames that do not say how joints have turned */
-    vg_skeleton skeleton;    /* the input's */
+    driving driving;         /* a skeleton comes in */
     size_t n, most;          /* poses in hand, at most BATCH */
     vg_frame out[BATCH];
     double *transforms[BATCH];
@@ -43,15 +41,11 @@ static void load_map(playback *p)
 
 static void take_skeleton(playback *p)
 {
-    vg_err e;
     if (p->map.kind != VG_MAP_BONES)
         cli_stop(VG_EINPUT,
                  "the input is a skeleton, but '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
                  p->o->map);
-    if (vg_skeleton_copy(&p->skeleton, &p->h->body.skeleton, &e) < 0 ||
-        vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0)
-        cli_die(&e);
-    p->driver = driving_start(&p->o->driving, &p->home.body.rig, p->o->map, &p->skeleton);
+    driving_start(&p->driving, &p->o->driving, &p->home.body.rig, p->o->map, &p->h->body.skeleton);
 }
 
 static void check_input(playback *p)
@@ -112,16 +106,9 @@ static void take_transforms(playback *p, size_t n, const vg_frame *in, double *c
 {
     const double *poses[BATCH] = {NULL};
     for (size_t i = 0; i < n; i++) poses[i] = in[i].values;
-    for (size_t i = 0; i < n && p->driver; i++) {
-        size_t joint, known;
-        const double *turns = vg_frame_turns(&in[i], &known);
-        if (!known) {
-            vg_joint_fitter_fit(p->fitter, poses[i], NULL, NULL, &joint);
-            turns = vg_joint_fitter_turns(p->fitter);
-        }
-        vg_driver_pose(p->driver, poses[i], turns, to[i]);
-    }
-    if (p->driver) return;
+    for (size_t i = 0; i < n && p->driving.driver; i++)
+        vg_driver_pose(p->driving.driver, poses[i], driving_turns(p->driving.fitter, &in[i]), to[i]);
+    if (p->driving.driver) return;
     if (p->kind == VG_VERTICES) vg_player_measure(p->player, n, poses, to);
     for (size_t i = 0; i < n && p->kind == VG_TRANSFORMS; i++) memcpy(to[i], poses[i], 7 * p->count * sizeof *to[i]);
 }

@@ -2,6 +2,7 @@
  * of patches are in vg-fitmap.c, rigs are driven in playback.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "rigging.h"
+#include "driving.h"
 #include "rig_choice.h"
 
 #include <math.h>
@@ -85,19 +86,14 @@ static void read_poses(work *w, vg_source *s)
 
 static void keep_motion(motion *m, const vg_frame *f, vg_joint_fitter *fitter)
 {
-    size_t joints = m->skeleton.njoints, which, known;
-    const double *turns = vg_frame_turns(f, &known);
+    size_t joints = m->skeleton.njoints;
     if (m->n == m->cap) {
         m->cap = 2 * m->cap + 16;
         m->positions = cli_resize(m->positions, m->cap, 3 * joints * sizeof *m->positions, "the skeleton's motion");
         m->turns = cli_resize(m->turns, m->cap, 4 * joints * sizeof *m->turns, "the skeleton's motion");
     }
-    if (!known) {
-        vg_joint_fitter_fit(fitter, f->values, NULL, NULL, &which);
-        turns = vg_joint_fitter_turns(fitter);
-    }
     memcpy(m->positions + 3 * joints * m->n, f->values, 3 * joints * sizeof *m->positions);
-    memcpy(m->turns + 4 * joints * m->n++, turns, 4 * joints * sizeof *m->turns);
+    memcpy(m->turns + 4 * joints * m->n++, driving_turns(fitter, f), 4 * joints * sizeof *m->turns);
 }
 
 static void read_skeleton(work *w)

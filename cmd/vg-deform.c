@@ -272,7 +272,10 @@ static void make_graphs(work *w)
         snprintf(name, sizeof name, "'%.190s'", opts.onto);
         if (vg_mesh_same(&w->h->body.mesh, "the sequence", &w->target.body.mesh, name, &e) < 0) {
             size_t n = strlen(e.message);
-            snprintf(e.message + n, sizeof e.message - n, ": pair them with vg-register and --correspondence");
+            bool skeletons = w->h->body.skeleton.njoints && w->target.body.skeleton.njoints;
+            snprintf(e.message + n, sizeof e.message - n,
+                     skeletons ? ": a skeleton of other joints takes a sequence of vertices"
+                               : ": pair them with vg-register and --correspondence");
             cli_die(&e);
         }
     }

@@ -248,6 +248,9 @@ END
     says "no joint of the skeleton has the name of a bone"
     [[ $stderr != *vg-register* ]]
     [ ! -e no.vgs ]
+    must vg-encode --vectors walk.bvh -o vectors.vgs
+    must_fail 3 vg-deform --onto other.bvh vectors.vgs -o no.vgs
+    says "a skeleton of other joints takes a sequence of vertices"
     pipe 'vg-deform -q --onto other.bvh --joints pairs.txt walk.bvh | vg-solve | vg-decode -q -o out.bvh'
     must vg-diff -t 1e-6 other.bvh out.bvh
     # how joints have turned arrives, too: about their own bones as well
