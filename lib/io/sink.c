@@ -223,61 +223,20 @@ static int drop_loose(vg_sink *s, bool drop, vg_err *e)
 
 /* ---- losses ---- */
 
-static bool has_faces_of(const vg_mesh *m, size_t least, size_t most)
-{
-    for (size_t f = 0; f < m->nf; f++) {
-        size_t n = m->start[f + 1] - m->start[f];
-        if (n >= least && n <= most) return true;
-    }
-    return false;
-}
-
-/* Whether the OBJ names a material library, which the new file also names. */
-static bool names_library(const vg_body *b)
-{
-    for (size_t i = 0; i < b->attributes.nlabels; i++)
-        if (b->attributes.labels[i].kind == VG_LABEL_LIBRARY) return true;
-    return false;
-}
-
-static int add_loss(vg_bytes *line, const char *what, vg_err *e)
-{
-    int r = line->size ? vgi_bytes_append(line, "; ", 2, e) : VG_OK;
-    return r < 0 ? r : vgi_bytes_append(line, what, strlen(what), e);
-}
-
-/* Report losses: first those that follow from the head, then those that the format reports. */
+/* What the head, the frames and the format say of what is lost. */
 static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
 {
     const vgi_sequence_format *f = s->plan.sequence;
-    const vg_head *h = s->head;
-    unsigned keeps = f ? f->keeps : s->plan.format->keeps;
+    vgi_losses x = {.head = s->head,
+                    .keeps = f ? f->keeps : s->plan.format->keeps,
+                    .names = f && s->names_lost && s->frames > 1,
+                    .times = f && s->times_lost,
+                    .scalars = s->scalars_lost,
+                    .own = f && f->warning ? f->warning(s->state) : NULL};
     if (s->mesh)
-        keeps |= s->mesh_format->keeps &
-                 (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS);
-    char scalars[120], asset[160];
-    vg_asset_text(&h->body.asset, asset, sizeof asset);
-    snprintf(scalars, sizeof scalars, "the '%s' of the vertices", s->scalars_lost);
-    bool faces = keeps & VGI_KEEPS_FACES, triangles = faces && !(keeps & VGI_KEEPS_POLYGONS);
-    const struct {
-        bool lost;
-        const char *what;
-    } all[] = {{!faces && h->body.mesh.nf, "the faces"},
-               {triangles && has_faces_of(&h->body.mesh, 4, SIZE_MAX), "polygons, which became triangles"},
-               {triangles && has_faces_of(&h->body.mesh, 2, 2), "line segments"},
-               {!(keeps & VGI_KEEPS_ORDER), "the numbers of the vertices, and those in no face"},
-               {!(keeps & VGI_KEEPS_TEXTURE) && h->body.attributes.ntex, "texture coordinates"},
-               {!(keeps & VGI_KEEPS_LABELS) && h->body.attributes.nlabels, "groups and materials"},
-               {!(keeps & VGI_KEEPS_ASSET) && *asset && !(keeps & VGI_KEEPS_LABELS && names_library(&h->body)), asset},
-               {!(keeps & VGI_KEEPS_SKELETON) && h->body.skeleton.njoints, "the skeleton"},
-               {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost && s->frames > 1, "the names of the frames"},
-               {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"},
-               {*s->scalars_lost, scalars}};
-    int r = VG_OK;
-    for (size_t i = 0; r == VG_OK && i < sizeof all / sizeof *all; i++)
-        if (all[i].lost) r = add_loss(line, all[i].what, e);
-    const char *own = f && f->warning ? f->warning(s->state) : NULL;
-    return r == VG_OK && own ? add_loss(line, own, e) : r;
+        x.keeps |= s->mesh_format->keeps &
+                   (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS);
+    return vgi_losses_list(&x, line, e);
 }
 
 static int warn_of_losses(vg_sink *s, vg_err *e)

@@ -1,5 +1,5 @@
-/* sink.h: the parts of sink.c: the plan of an output (sink_plan.c), names of files (file_names.c), files of an
- * earlier set (earlier.c), and a sequence without the vertices that are in no face (slim.c).
+/* sink.h: the parts of sink.c: the plan of an output (sink_plan.c), what it does not keep (losses.c), names of files
+ * (file_names.c), files of an earlier set (earlier.c), and a sequence without the vertices that are in no face (slim.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_SINK_H
 #define VG_SINK_H
@@ -40,6 +40,19 @@ bool vgi_is_directory(const char *path);
 char *vgi_parent_directory(const char *path, size_t n, vg_err *e);
 /* vgi_check_directory: check that files can be created in `dir`. Messages say that `output` cannot be written. */
 int vgi_check_directory(const char *dir, const char *output, vg_err *e) VG_MUST_CHECK;
+
+/* ---- losses.c: what an output does not keep ---- */
+
+typedef struct vgi_losses {
+    const vg_head *head;
+    unsigned keeps;      /* what the formats of the output keep */
+    bool names, times;   /* of frames, lost unless they are kept */
+    const char *scalars; /* the channel of vertices that is lost; empty: none */
+    const char *own;     /* what the format itself reports; NULL: nothing */
+} vgi_losses;
+
+/* vgi_losses_list: append what is lost: first what follows from the head, then what the format reports. */
+int vgi_losses_list(const vgi_losses *x, vg_bytes *line, vg_err *e) VG_MUST_CHECK;
 
 /* ---- file_names.c: names of files, ascending in natural order, in which readers take them ---- */
 
