@@ -22,8 +22,6 @@ enum {
     MESSAGE_BYTES = 1024
 };
 
-struct cli_state cli;
-
 /* Programs exit without the C library's clean-up, which would flush half a report. A coverage build needs it to
  * write its counters. */
 void __gcov_dump(void) __attribute__((weak));
@@ -36,7 +34,6 @@ static void leave(int status)
 
 /* ------------------------------------------------------------------------------------------- messages -- */
 
-/* C0, DEL, and C1 in UTF-8. */
 int cli_by_number(const void *a, const void *b)
 {
     const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
@@ -56,6 +53,7 @@ double cli_seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+/* C0, DEL, and C1 in UTF-8. */
 void cli_strip_controls(char *s)
 {
     for (unsigned char *p = (unsigned char *)s; *p; p++) {
@@ -80,7 +78,7 @@ static void say_line(const char *kind, const char *format, va_list ap)
     char body[MESSAGE_BYTES], line[MESSAGE_BYTES + 64];
     vsnprintf(body, sizeof body, format, ap);
     cli_strip_controls(body);
-    int n = snprintf(line, sizeof line, "%s: %s%s\n", cli.program->name, kind, body);
+    int n = snprintf(line, sizeof line, "%s: %s%s\n", options_program()->name, kind, body);
     progress_pause();
     if (n > 0) print_error(line, (size_t)n < sizeof line ? (size_t)n : sizeof line - 1);
     progress_go_on();
@@ -88,7 +86,7 @@ static void say_line(const char *kind, const char *format, va_list ap)
 
 void cli_warn(const char *format, ...)
 {
-    if (cli.quiet) return;
+    if (cli_quiet()) return;
     va_list ap;
     va_start(ap, format);
     say_line("warning: ", format, ap);
@@ -97,7 +95,7 @@ void cli_warn(const char *format, ...)
 
 void cli_say(const char *format, ...)
 {
-    if (cli.quiet) return;
+    if (cli_quiet()) return;
     va_list ap;
     va_start(ap, format);
     say_line("", format, ap);
@@ -106,7 +104,7 @@ void cli_say(const char *format, ...)
 
 void cli_note(const char *format, ...)
 {
-    if (!cli.verbose) return;
+    if (!cli_verbose()) return;
     va_list ap;
     va_start(ap, format);
     say_line("", format, ap);
@@ -133,7 +131,7 @@ static void give_up(int code, int status, const char *message)
 {
     const vg_failure *before = code == VG_ETRUNC && upstream ? vg_source_failure(upstream) : NULL;
     if (before) output_abandon(before->program, (int)before->status, before->message);
-    else output_abandon(cli.program->name, status, message);
+    else output_abandon(options_program()->name, status, message);
     leave(status);
 }
 
@@ -181,7 +179,7 @@ void cli_usage(const char *format, ...)
     cli_strip_controls(text);
     output_remove();
     say_error("%s", text);
-    int n = snprintf(usage, sizeof usage, "usage: %s %s\n", cli.program->name, cli.program->synopsis);
+    int n = snprintf(usage, sizeof usage, "usage: %s %s\n", options_program()->name, options_program()->synopsis);
     if (n > 0) print_error(usage, (size_t)n < sizeof usage ? (size_t)n : sizeof usage - 1);
     give_up(VG_EARG, 2, text);
 }
@@ -269,14 +267,14 @@ static void choose_kernels(void)
 size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
 {
     progress_start();
-    cli.program = p, cli.argc = argc, cli.argv = argv;
+    options_start(p, argc, argv);
     repair_descriptors();
     if (atexit(library_gave_up)) cli_stop(VG_ENOMEM, "not enough memory to start");
     signal(SIGPIPE, SIG_DFL); /* the parent may have ignored SIGPIPE */
     signal(SIGXFSZ, SIG_IGN); /* exceeding a file size limit becomes a failed write with a message */
     choose_kernels();
     *operands = cli_allocate((size_t)argc, sizeof **operands, "the operands");
-    size_t n = options_parse(argc, argv, *operands);
+    size_t n = options_parse(*operands);
     for (size_t i = 0; i < n; i++) cli_claim_input(NULL, (*operands)[i]);
     if (p->writes_stream || p->writes_text || p->writes_file) output_check(p->writes_stream);
     widen_pipe(STDIN_FILENO);
@@ -305,7 +303,7 @@ void cli_expect_input(size_t operands)
     expected = true;
     cli_claim_input(NULL, "-");
     if (isatty(STDIN_FILENO))
-        cli_usage("no input: name a stream, mesh file, archive or directory, or pipe one into %s", cli.program->name);
+        cli_usage("no input: name a stream, mesh file, archive or directory, or pipe one into %s", options_program()->name);
 }
 
 vg_source *cli_source(char **operands, size_t n)
@@ -320,12 +318,12 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
     vg_source_options options = o ? *o : (vg_source_options){0};
     vg_source *s = NULL;
     vg_err e;
-    options.threads = cli.threads;
+    options.threads = cli_threads();
     cli_expect_input(n);
     if (vg_source_open_with(&s, from, n ? n : 1, &options, &e) < 0) cli_die(&e);
     if (vg_source_warning(s)) cli_warn("%s", vg_source_warning(s));
     const vg_head *h = vg_source_head(s);
-    if (h->kind == VG_OTHER && !cli.program->any_form)
+    if (h->kind == VG_OTHER && !options_program()->any_form)
         cli_stop(VG_EINPUT, "the input holds '%s', a form of frames that this program does not know", vg_head_form(h));
     return upstream = s;
 }

@@ -47,21 +47,21 @@ typedef struct cli_program {
     const size_t *vectors_if; /* ... or it is if this choice is not the first one; NULL: there is no such option */
     bool writes_map;      /* the stream holds a map and no frames: it is for vg-play */
     bool writes_text;     /* has -o --output and --json */
+    bool reports_json;    /* has --json, for a report beside its output */
     bool writes_file;     /* has -o --output, written through cli_text_open */
     bool traces;          /* has --no-provenance, because it writes another stream */
     bool threaded;        /* has -j --threads */
     bool any_form;        /* accepts frames of unknown form, because it does not use their values */
 } cli_program;
 
-/* The values of the shared options. */
-extern struct cli_state {
-    const cli_program *program;
-    int argc; /* the command line, for provenance */
-    char **argv;
-    bool quiet, verbose, json, no_provenance;
-    const char *output; /* NULL: standard output */
-    int threads;        /* >= 1 */
-} cli;
+/* The values of the options that programs share, once cli_start has parsed them. */
+const char *cli_output(void); /* NULL: standard output */
+int cli_threads(void);        /* >= 1 */
+bool cli_quiet(void);
+bool cli_verbose(void);
+bool cli_json(void);
+/* cli_be_quiet: as if --quiet were given: of several processes of one job only the first speaks. */
+void cli_be_quiet(void);
 
 /* cli_start: call this first. Parses the command line; -h and -V print and exit 0; wrong usage prints the synopsis
  * and exits 2. Returns the number of operands and sets *operands. Repairs descriptors 0 to 2 and resets SIGPIPE. */

@@ -117,7 +117,7 @@ void network_plot_write(const vg_network *n, const char *label, bool svg)
     add_errors(&c, 1);
     add_errors(&c, 0);
     FILE *out = cli_text_open();
-    if (vg_plot_write(c.chart, c.ncharts, svg, fileno(out), cli.output ? cli.output : "standard output", &e) < 0) cli_die(&e);
+    if (vg_plot_write(c.chart, c.ncharts, svg, fileno(out), cli_output() ? cli_output() : "standard output", &e) < 0) cli_die(&e);
     cli_text_end();
     free(c.x);
 }

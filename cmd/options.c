@@ -14,24 +14,25 @@
 
 enum { MOST_OPTIONS = 64, MOST_THREADS = 256, HELP_COLUMN = 32 };
 
+static options_state state;
 static bool want_help, want_version;
 static long threads_asked;
 
 /* The shared options, and which programs have them. */
-typedef enum shared_use { ALL, OUTPUT, TEXT, STREAM, THREADS } shared_use;
+typedef enum shared_use { ALL, OUTPUT, JSON, STREAM, THREADS } shared_use;
 static const struct shared {
     shared_use use;
     cli_option option;
 } shared_options[] = {
     {OUTPUT, {.name = "output", .letter = 'o', .value = "FILE", .help = "write to FILE instead of standard output",
-              .text = &cli.output}},
-    {TEXT, {.name = "json", .help = "print JSON", .flag = &cli.json}},
+              .text = &state.output}},
+    {JSON, {.name = "json", .help = "print JSON", .flag = &state.json}},
     {STREAM, {.name = "no-provenance", .help = "do not record this command line in the stream",
-              .flag = &cli.no_provenance}},
+              .flag = &state.no_provenance}},
     {THREADS, {.name = "threads", .letter = 'j', .value = "N", .help = "use N threads (default: all processors)",
                .integer = &threads_asked, .least = 1, .most = MOST_THREADS}},
-    {ALL, {.name = "quiet", .letter = 'q', .help = "no warnings and no progress", .flag = &cli.quiet}},
-    {ALL, {.name = "verbose", .letter = 'v', .help = "report more on standard error", .flag = &cli.verbose}},
+    {ALL, {.name = "quiet", .letter = 'q', .help = "no warnings and no progress", .flag = &state.quiet}},
+    {ALL, {.name = "verbose", .letter = 'v', .help = "report more on standard error", .flag = &state.verbose}},
     {ALL, {.name = "help", .letter = 'h', .help = "print this help", .flag = &want_help}},
     {ALL, {.name = "version", .letter = 'V', .help = "print the version", .flag = &want_version}},
 };
@@ -40,7 +41,7 @@ static bool applies(const cli_program *p, shared_use use)
 {
     switch (use) {
     case OUTPUT: return p->writes_stream || p->writes_text || p->writes_file;
-    case TEXT: return p->writes_text;
+    case JSON: return p->writes_text || p->reports_json;
     case STREAM: return p->writes_stream || p->traces;
     case THREADS: return p->threaded;
     default: return true;
@@ -248,7 +249,7 @@ static const cli_option *likely_option(const char *text, size_t length)
 
 static const cli_moved *moved_option(const char *text, size_t length)
 {
-    for (const cli_moved *m = cli.program->moved; m && m->name; m++)
+    for (const cli_moved *m = state.program->moved; m && m->name; m++)
         if (strlen(m->name) == length && !memcmp(m->name, text, length)) return m;
     return NULL;
 }
@@ -261,7 +262,7 @@ static void refuse_option(int problem, char **argv)
     const cli_option *o = number < known.n ? known.at[number] : NULL;
     if (problem == ':' && o) cli_usage("option '--%s' needs a value: %s", o->name, o->value);
     if (o) cli_usage("option '--%s' takes no value", o->name);
-    if (optopt) cli_usage("unknown option '-%c': '%s --help' lists them", optopt, cli.program->name);
+    if (optopt) cli_usage("unknown option '-%c': '%s --help' lists them", optopt, state.program->name);
     const char *text = argv[optind - 1];
     int length = (int)strcspn(text, "=");
     const cli_moved *moved = moved_option(text + 2, length > 2 ? (size_t)length - 2 : 0);
@@ -274,7 +275,7 @@ static void refuse_option(int problem, char **argv)
         cli_usage("ambiguous option '%.*s': it could be '--%s' or '--%s'", length, text, first->name, second->name);
     if (length > 2 && (o = likely_option(text + 2, (size_t)length - 2)))
         cli_usage("unknown option '%.*s': did you mean '--%s'?", length, text, o->name);
-    cli_usage("unknown option '%.*s': '%s --help' lists them", length, text, cli.program->name);
+    cli_usage("unknown option '%.*s': '%s --help' lists them", length, text, state.program->name);
 }
 
 /* An option of two words takes the next argument, too, unless that is an option. */
@@ -338,7 +339,7 @@ static void check_excludes(const cli_option *o)
 static void print_version(const char *name)
 {
     printf("%s (vg) %s\nstream 1.0\n", name, VG_VERSION);
-    if (!cli.verbose) return;
+    if (!state.verbose) return;
     printf("kernels for %s; this machine has", vg_isa());
     const char *set;
     for (size_t i = 0; (set = vg_isa_at(i)); i++) printf("%s %s", i ? "," : "", set);
@@ -358,11 +359,16 @@ static void check_together(void)
     }
 }
 
-size_t options_parse(int argc, char **argv, char **operands)
+void options_start(const cli_program *p, int argc, char **argv)
 {
-    const cli_program *p = cli.program;
+    state.program = p, state.argc = argc, state.argv = argv;
+}
+
+size_t options_parse(char **operands)
+{
+    const cli_program *p = state.program;
     gather_options(p);
-    size_t n = collect_operands(argc, argv, operands);
+    size_t n = collect_operands(state.argc, state.argv, operands);
     if (want_help) print_help(p);
     if (want_version && !want_help) print_version(p->name);
     if (want_help || want_version) cli_finish(0);
@@ -371,11 +377,51 @@ size_t options_parse(int argc, char **argv, char **operands)
         cli_usage("one operand too many: '%s'", operands[p->most_operands]);
     }
     check_together();
-    cli.threads = !p->threaded ? 1 : threads_asked ? (int)threads_asked : processors_count(MOST_THREADS);
-    if (p->threaded && !(cli.threads = vg_threads_with_room(cli.threads)))
+    state.threads = !p->threaded ? 1 : threads_asked ? (int)threads_asked : processors_count(MOST_THREADS);
+    if (p->threaded && !(state.threads = vg_threads_with_room(state.threads)))
         cli_stop(VG_ENOMEM, "not enough memory to calculate: is there a limit, such as ulimit -v?");
-    if (cli.output && !strcmp(cli.output, "-")) cli.output = NULL;
+    if (state.output && !strcmp(state.output, "-")) state.output = NULL;
     return n;
+}
+
+options_state *options_of_process(void)
+{
+    return &state;
+}
+
+const cli_program *options_program(void)
+{
+    return state.program;
+}
+
+const char *cli_output(void)
+{
+    return state.output;
+}
+
+int cli_threads(void)
+{
+    return state.threads;
+}
+
+bool cli_quiet(void)
+{
+    return state.quiet;
+}
+
+bool cli_verbose(void)
+{
+    return state.verbose;
+}
+
+bool cli_json(void)
+{
+    return state.json;
+}
+
+void cli_be_quiet(void)
+{
+    state.quiet = true;
 }
 
 /* --------------------------------------------------------------------------------------------- values -- */

@@ -3,6 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "output.h"
 #include "cli.h"
+#include "options.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -103,23 +104,24 @@ static bool names_meshes(const char *name)
 
 static bool writes_vectors(void)
 {
-    return cli.program->writes_vectors || (cli.program->vectors_if && *cli.program->vectors_if);
+    const cli_program *p = options_program();
+    return p->writes_vectors || (p->vectors_if && *p->vectors_if);
 }
 
 static void refuse_terminal(void) __attribute__((noreturn));
 static void refuse_terminal(void)
 {
     cli_usage("a stream is not written to a terminal: use -o FILE or pipe it into %s",
-              writes_vectors()            ? "'vg-solve | vg-decode -o NAME'"
-              : cli.program->writes_map   ? "a file for vg-play"
-                                          : "'vg-decode -o NAME'");
+              writes_vectors()                ? "'vg-solve | vg-decode -o NAME'"
+              : options_program()->writes_map ? "a file for vg-play"
+                                              : "'vg-decode -o NAME'");
 }
 
 static void refuse_stream(const char *name) __attribute__((noreturn));
 static void refuse_stream(const char *name)
 {
     const char *last = names_picture(name) ? "vg-view" : "vg-decode";
-    if (cli.program->writes_map)
+    if (options_program()->writes_map)
         cli_usage("the output is a map, not poses: write it with -o MAP, then 'vg-play MAP POSES | %s -o %s'", last,
                   name);
     cli_usage("the output is a stream: pipe it into '%s%s -o %s'", writes_vectors() ? "vg-solve | " : "",
@@ -129,7 +131,7 @@ static void refuse_stream(const char *name)
 void output_check(bool stream)
 {
     vg_err e;
-    const char *name = cli.output;
+    const char *name = cli_output();
     if (stream && name && (names_meshes(name) || names_picture(name))) refuse_stream(name);
     if (stream && !name && isatty(STDOUT_FILENO)) refuse_terminal();
     if (!name) return;
@@ -141,13 +143,13 @@ void output_check(bool stream)
 static void open_output(void)
 {
     vg_err e;
-    if (!cli.output) {
+    if (!cli_output()) {
         out.fd = STDOUT_FILENO;
         snprintf(out.shown, sizeof out.shown, "standard output");
         return;
     }
     catch_signals();
-    out.fd = vg_targets_open(&out.targets, cli.output, &e);
+    out.fd = vg_targets_open(&out.targets, cli_output(), &e);
     if (out.fd < 0) cli_die(&e);
 }
 
@@ -196,7 +198,7 @@ bool cli_same_output(const char *a, const char *b)
 
 void cli_redirect(const char *file, bool stream)
 {
-    cli.output = file && strcmp(file, "-") ? file : NULL;
+    options_of_process()->output = file && strcmp(file, "-") ? file : NULL;
     output_check(stream);
 }
 
@@ -205,15 +207,16 @@ void cli_stream_open(vg_head *h)
     vg_err e;
     open_output();
     if (isatty(out.fd)) refuse_terminal();
-    if (!cli.no_provenance) {
+    if (!options_of_process()->no_provenance) {
         /* the program's name without its path: the same bytes on any machine */
-        char *called = cli.argv[0];
-        cli.argv[0] = (char *)(uintptr_t)cli.program->name;
-        int r = vg_head_trace(h, cli.program->name, cli.argc, cli.argv, &e);
-        cli.argv[0] = called;
+        const options_state *o = options_of_process();
+        char *called = o->argv[0];
+        o->argv[0] = (char *)(uintptr_t)o->program->name;
+        int r = vg_head_trace(h, o->program->name, o->argc, o->argv, &e);
+        o->argv[0] = called;
         if (r < 0) cli_die(&e);
     }
-    const char *name = cli.output ? cli.output : "standard output";
+    const char *name = cli_output() ? cli_output() : "standard output";
     if (vg_writer_open(&out.writer, out.fd, name, h, &e) < 0) cli_die(&e);
 }
 

@@ -199,7 +199,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     if (in) check_input(p);
     else p->count = p->map.n, h->precision = p->home.precision;
     bone_edits_find(&p->o->edits, &p->map, &p->home.body.rig, p->o->map);
-    if (vg_player_new(&p->player, &p->home.body, &p->map, h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_player_new(&p->player, &p->home.body, &p->map, h->precision == VG_F32, cli_threads(), &e) < 0) cli_die(&e);
     make_head(p);
     for (size_t i = 0; i < p->most; i++) {
         p->transforms[i] = cli_allocate(7 * p->count, sizeof(double), "the transforms");

@@ -6,6 +6,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "progress.h"
 #include "cli.h"
+#include "options.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -118,7 +119,7 @@ static void print_duration(char *to, size_t size, double seconds)
 static void draw_progress(const char *label, uint64_t n, uint64_t total, double left)
 {
     char line[256], duration[40];
-    int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s %llu", cli.program->name, label, (unsigned long long)n);
+    int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s %llu", options_program()->name, label, (unsigned long long)n);
     if (total) k += snprintf(line + k, sizeof line - (size_t)k, " of %llu", (unsigned long long)total);
     print_duration(duration, sizeof duration, left);
     if (left >= 1) k += snprintf(line + k, sizeof line - (size_t)k, ", %s left", duration);
@@ -131,7 +132,7 @@ static void draw_working(double since)
 {
     char line[192], duration[40];
     print_duration(duration, sizeof duration, since);
-    int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s, %s", cli.program->name, progress.label, duration);
+    int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s, %s", options_program()->name, progress.label, duration);
     progress.drawn = true;
     write_some(STDERR_FILENO, line, k);
 }
@@ -140,7 +141,7 @@ static void draw_working(double since)
 static void print_json(const char *label, uint64_t n, uint64_t total, double left, double now)
 {
     char line[256];
-    int k = snprintf(line, sizeof line, "{\"program\":\"%s\",\"doing\":\"%.64s\",\"done\":%llu", cli.program->name,
+    int k = snprintf(line, sizeof line, "{\"program\":\"%s\",\"doing\":\"%.64s\",\"done\":%llu", options_program()->name,
                      label, (unsigned long long)n);
     if (total) k += snprintf(line + k, sizeof line - (size_t)k, ",\"total\":%llu", (unsigned long long)total);
     k += snprintf(line + k, sizeof line - (size_t)k, ",\"seconds\":%.3f", now - progress.started);
@@ -160,7 +161,7 @@ static double time_left(uint64_t n, uint64_t total, double now)
 static bool is_watched(void)
 {
     static int terminal = -1;
-    if (terminal < 0) terminal = isatty(STDERR_FILENO) && !cli.quiet;
+    if (terminal < 0) terminal = isatty(STDERR_FILENO) && !cli_quiet();
     return terminal || progress.json;
 }
 

@@ -91,8 +91,8 @@ static void try_fold(choosing *x, const vg_rig_options *o)
         x->now = &x->at[c];
         vg_rig_fitter_choose(x->fitter, x->now->bones_per_corner, x->now->refine);
         if (vg_rig_fitter_finish(x->fitter, VG_RIG_ENVELOPE, &rig, &envelope, &e) < 0 ||
-            vg_player_new(&x->players[0], &h->body, &skinning, false, cli.threads, &e) < 0 ||
-            vg_player_new(&x->players[1], &h->body, &envelope, false, cli.threads, &e) < 0)
+            vg_player_new(&x->players[0], &h->body, &skinning, false, cli_threads(), &e) < 0 ||
+            vg_player_new(&x->players[1], &h->body, &envelope, false, cli_threads(), &e) < 0)
             cli_die(&e);
         fitting_pass(x->f, is_left_out, judge_batch, x);
         vg_player_free(&x->players[0]);

@@ -138,7 +138,7 @@ static void locate_root(work *w, double *positions)
         at[i] = m->positions + 3 * joints * w->sample_at[i], turns[i] = m->turns + 4 * joints * w->sample_at[i];
     }
     if (vg_rig_locate(&m->skeleton, w->h->body.mesh.nv, w->h->body.reference, w->nsample, poses, at, turns,
-                      cli.threads, shift, &spread, &e) < 0)
+                      cli_threads(), shift, &spread, &e) < 0)
         cli_die(&e);
     for (size_t j = 0; j < joints; j++)
         for (size_t k = 0; k < 3; k++) positions[3 * j + k] += shift[k];
@@ -208,8 +208,8 @@ static void place_skeleton(work *w)
     if (known) return;
     double miss, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
     cli_working("learning how bones move");
-    if (vg_rig_learn(&w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, w->nsample, (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
-        vg_inverse_skin_new(&w->inverse, &w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, cli.threads, &e) < 0)
+    if (vg_rig_learn(&w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, w->nsample, (const double *const *)w->sample, cli_threads(), &miss, &e) < 0 ||
+        vg_inverse_skin_new(&w->inverse, &w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, cli_threads(), &e) < 0)
         cli_die(&e);
     cli_note("the motion of the bones was learned from %zu poses: residual of skinning %.3g D", w->nsample,
              d > 0 ? miss / d : 0);
@@ -241,8 +241,8 @@ static void find_bones(work *w)
     double miss, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
     size_t nv = w->h->body.mesh.nv, wanted = (size_t)w->o->bones;
     if (vg_rig_decompose(&w->h->body.rig, nv, w->h->body.reference, wanted, w->nsample,
-                         (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
-        vg_free_bones_new(&w->free, &w->h->body.rig, nv, w->h->body.reference, cli.threads, &e) < 0)
+                         (const double *const *)w->sample, cli_threads(), &miss, &e) < 0 ||
+        vg_free_bones_new(&w->free, &w->h->body.rig, nv, w->h->body.reference, cli_threads(), &e) < 0)
         cli_die(&e);
     if (w->h->body.rig.nbones < wanted)
         cli_note("%zu bones are all that the poses determine, %zu were requested", w->h->body.rig.nbones, wanted);
@@ -351,9 +351,9 @@ static void report_fit(work *w)
     static const char *const mixed[2] = {"mixed, fitted", "mixed, left out"};
     size_t nv = w->h->body.mesh.nv;
     double d = vg_diagonal(w->h->body.reference, nv);
-    if (cli.quiet || !(d > 0)) return;
+    if (cli_quiet() || !(d > 0)) return;
     for (int i = 0; i < 2; i++)
-        if (w->maps[i].n && vg_player_new(&players[i], &w->h->body, &w->maps[i], false, cli.threads, &e) < 0) cli_die(&e);
+        if (w->maps[i].n && vg_player_new(&players[i], &w->h->body, &w->maps[i], false, cli_threads(), &e) < 0) cli_die(&e);
     for (int i = 0; i < 4; i++) {
         fitting_errors *x = &w->errors[i / 2][i % 2];
         x->first = rig_array(nv, sizeof *x->first), x->second = rig_array(nv, sizeof *x->second);
@@ -389,7 +389,7 @@ static void fit_rig(work *w)
     vg_rig_options o = {.bones_per_corner = w->o->bones_per_corner ? (size_t)w->o->bones_per_corner : 2,
                         .hold = w->o->hold,
                         .refine = w->o->refine < 0 ? 0.003 : w->o->refine,
-                        .threads = cli.threads};
+                        .threads = cli_threads()};
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_rig_fitter_new(&rig_fitter, h, &o, &e) < 0) cli_die(&e);
     w->transforms = rig_array(w->poses.n, sizeof *w->transforms);
     fitting_pass(&w->poses, NULL, fit_batch, w);

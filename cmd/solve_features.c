@@ -60,7 +60,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     vg_err e;
     (void)in;
     check_form(h);
-    vg_feature_options o = {.nine = h->width == 9, .threads = cli.threads};
+    vg_feature_options o = {.nine = h->width == 9, .threads = cli_threads()};
     if (vg_featurer_new(&w->featurer, &h->body.mesh, h->body.reference, &o, &e) < 0) cli_die(&e);
     w->h = h, w->parts = vg_featurer_get_stats(w->featurer).parts;
     measure_rest(w, h);
@@ -127,7 +127,7 @@ static void clear_work(work *w)
 
 void features_solve(vg_source *s)
 {
-    work w = {.most = 8 * (size_t)cli.threads};
+    work w = {.most = 8 * (size_t)cli_threads()};
     const step back = {.batch = w.most, .unit = "poses", .init = prepare, .process = solve_batch};
     step_run(&back, &w, s);
     if (w.unplaced)

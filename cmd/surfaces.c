@@ -30,7 +30,7 @@ void surfaces_begin(surfaces *s, const vg_body *truth, const vg_body *result, re
     vg_err e;
     s->diagonal = vg_diagonal(truth->reference, truth->mesh.nv);
     s->frames = frames;
-    if (vg_surface_measures_new(&s->measures, &truth->mesh, &result->mesh, s->diagonal, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_surface_measures_new(&s->measures, &truth->mesh, &result->mesh, s->diagonal, cli_threads(), &e) < 0) cli_die(&e);
     if (frames) report_table(frames, "frame_errors", "", false, frame_columns, COLUMNS_FRAME);
 }
 
@@ -41,7 +41,7 @@ const double *surfaces_add(surfaces *s, size_t i, const char *name, const double
     if (vg_surface_measures_add(s->measures, truth, result, found, &e) < 0) cli_die(&e);
     if (s->frames) {
         double x[3] = {larger(found[0].mean, found[1].mean), larger(found[0].p95, found[1].p95), larger(found[0].max, found[1].max)};
-        const double to = cli.json ? 1 : 100;
+        const double to = cli_json() ? 1 : 100;
         const report_value row[COLUMNS_FRAME] = {
             report_count(i), report_text(name), report_number(x[0]), report_number(x[1]), report_number(x[2]),
             report_number(to * in_D(x[0], s->diagonal)), report_number(to * in_D(x[1], s->diagonal)),

@@ -11,7 +11,7 @@ static vg_sink_options sink_options;
 static long first_number, most_targets;
 static double fps; /* 0: the times of the frames */
 static uint64_t written;
-static const char *output; /* not cli.output, which is NULL for "-" as for none */
+static const char *output; /* not cli_output(), which is NULL for "-" as for none */
 
 static const cli_option options[] = {
     {"output", 'o', "FILE", "a.obj, 'a-%04d.ply', DIR/, a.zip, a.npz, ...; '-' is standard output; '-:f32' numbers alone",
@@ -152,7 +152,7 @@ static void say_report(void)
     bool inexact;
     const bool chosen = sink_options.quantize || sink_options.morph_tolerance > 0;
     const char *report = vg_sink_report(sink, &inexact);
-    if (report && (cli.verbose || (inexact && chosen))) cli_say("%s", report);
+    if (report && (cli_verbose() || (inexact && chosen))) cli_say("%s", report);
 }
 
 static void decode_frames(vg_source *s)
@@ -185,14 +185,14 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_err e;
     sink_options.first_number = first_number, sink_options.most_targets = (size_t)most_targets;
-    sink_options.threads = cli.threads;
+    sink_options.threads = cli_threads();
     if (!output) cli_usage("name the output: -o poses.zip, -o 'pose-%%04d.obj', or -o poses/");
     size_t raw = 0;
     char *file = NULL;
     if (raw_output(output, &raw, &file)) {
         refuse_raw_options();
         cli_redirect(file, false);
-        if (!cli.output && isatty(STDOUT_FILENO)) cli_usage("numbers are not written to a terminal: pipe them into a program");
+        if (!cli_output() && isatty(STDOUT_FILENO)) cli_usage("numbers are not written to a terminal: pipe them into a program");
     } else if (vg_sink_check(output, &sink_options, &e) < 0) {
         cli_die(&e);
     }

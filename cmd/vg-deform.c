@@ -325,7 +325,7 @@ static double degrees_apart(const work *w)
  * who walks 45. Faces that were paired are 12 to 33 degrees apart, of a target that has another axis up 64. */
 static void warn_of_other_pose(const work *w)
 {
-    if (!opts.onto || cli.quiet) return;
+    if (!opts.onto || cli_quiet()) return;
     double degrees = w->carrier ? vg_cross_transfer_turned(w->carrier) : degrees_apart(w), most = w->carrier ? 45 : 30;
     if (degrees > most)
         cli_warn(
@@ -381,7 +381,7 @@ static void make_corrector(work *w)
         run_batch(w, 1, &source[i], &made[i]);
     }
     const vg_examples x = {from.n, source, target, (const double *const *)made};
-    if (vg_corrector_new(&w->corrector, w->from, w->source.body.reference, w->to, w->target.body.reference, &x, cli.threads, &e) < 0)
+    if (vg_corrector_new(&w->corrector, w->from, w->source.body.reference, w->to, w->target.body.reference, &x, cli_threads(), &e) < 0)
         cli_die(&e);
     if (w->pinner) find_sculpted(w, &to);
     for (size_t i = 0; i < from.n; i++) free(made[i]);
@@ -415,11 +415,11 @@ static void make_step(work *w)
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
         r = vg_cross_transfer_new(&w->carrier, &w->source.body.mesh, w->source.body.reference, &w->pairs.correspondence, w->to,
-                           t->body.reference, method, cli.threads, &e);
+                           t->body.reference, method, cli_threads(), &e);
     } else if (w->way == SHAPE) {
-        r = vg_shaper_new(&w->shaper, w->to, w->source.body.reference, t->body.reference, cli.threads, &e);
+        r = vg_shaper_new(&w->shaper, w->to, w->source.body.reference, t->body.reference, cli_threads(), &e);
     } else {
-        r = vg_deformer_new(&w->deformer, w->from, w->source.body.reference, cli.threads, &e);
+        r = vg_deformer_new(&w->deformer, w->from, w->source.body.reference, cli_threads(), &e);
         double *vectors = cli_allocate(3 * vg_graph_corners(w->from), sizeof *vectors, "the mesh of the sequence");
         if (r == VG_OK && opts.onto) {
             vg_graph_vectors(w->from, t->body.reference, vectors);
@@ -466,7 +466,7 @@ static void make_rider(work *w)
     w->way = RIDE;
     keep_source(w);
     if (vg_rider_new(&w->rider, &w->source.body.mesh, w->source.body.reference, &w->pairs.correspondence, &t->mesh, t->reference,
-                     cli.threads, &e) < 0)
+                     cli_threads(), &e) < 0)
         cli_die(&e);
     vg_head_drop(h, "selection");
     vg_head_drop(h, "links");

@@ -3,6 +3,7 @@
  * the error.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
+#include "options.h"
 #include "error_plot.h"
 #include "report.h"
 #include "surfaces.h"
@@ -128,7 +129,7 @@ enum { COLUMNS_FRAME = 8, COLUMNS_ERROR = 7, COLUMNS_FACE = 4, COLUMNS_PLANARITY
 static void answer_no(const char *line) __attribute__((noreturn));
 static void answer_no(const char *line)
 {
-    if (cli.quiet) cli_finish(1);
+    if (cli_quiet()) cli_finish(1);
     cli_no("%s", line);
 }
 
@@ -136,7 +137,7 @@ static void answer_no(const char *line)
 static void cannot_compare(const char *reason) __attribute__((noreturn));
 static void cannot_compare(const char *reason)
 {
-    if (cli.json) {
+    if (cli_json()) {
         report *r = report_new();
         report_put(r, "comparable", NULL, report_flag(false));
         report_put(r, "reason", NULL, report_text(reason));
@@ -214,7 +215,7 @@ static void put_heat(vg_frame *f, size_t nv, const double *errors, double diagon
 /* What --heat writes goes out frame by frame: who looks at it may be waiting. */
 static size_t batch_size(size_t nv)
 {
-    size_t threads = (size_t)cli.threads, room = BATCH_BYTES / (7 * sizeof(double)) / (nv + 1);
+    size_t threads = (size_t)cli_threads(), room = BATCH_BYTES / (7 * sizeof(double)) / (nv + 1);
     if (opts.heat) return 1;
     return room < threads ? threads : room < POSES_PER_THREAD * threads ? room : POSES_PER_THREAD * threads;
 }
@@ -300,7 +301,7 @@ static void compare(side *truth, side *result, findings *found, report *r)
     const double *reference = truth->head->body.reference;
     double diagonal = vg_diagonal(reference, nv);
     make_batch(&b, nv);
-    if (vg_measures_new(&x, &truth->head->body.mesh, reference, opts.centred, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_measures_new(&x, &truth->head->body.mesh, reference, opts.centred, cli_threads(), &e) < 0) cli_die(&e);
     if (opts.frames) report_table(r, "frame_errors", "", false, frame_columns, COLUMNS_FRAME);
     open_heat(result, truth);
     for (bool more = true; more;) {
@@ -463,15 +464,15 @@ static void parse_options(int argc, char **argv, char ***operands)
 {
     size_t n = cli_start(&program, argc, argv, operands);
     if (n < 2) cli_usage("two sequences are needed: TRUTH and RESULT");
-    report_file = cli.output;
+    report_file = cli_output();
     if (opts.plot) error_plot_check(opts.plot, report_file, opts.heat);
     if (opts.unit && !unit_metres(opts.unit, strlen(opts.unit)))
         cli_usage("option '--unit' needs one of " UNITS_LIST ", not '%s'", opts.unit);
     if (opts.unit && !opts.metres) cli_usage("--unit is for a tolerance with a unit, such as 0.1mm");
-    if (!opts.heat && cli.no_provenance) cli_usage("--no-provenance applies to the stream that --heat writes");
+    if (!opts.heat && options_of_process()->no_provenance) cli_usage("--no-provenance applies to the stream that --heat writes");
     if (!opts.heat) return;
-    if (replaces_report() && (cli.json || opts.frames))
-        cli_usage("option '--%s' applies to the report, which needs a file: -o FILE", cli.json ? "json" : "frames");
+    if (replaces_report() && (cli_json() || opts.frames))
+        cli_usage("option '--%s' applies to the report, which needs a file: -o FILE", cli_json() ? "json" : "frames");
     if (report_file && cli_same_output(opts.heat, report_file))
         cli_usage("'%s' cannot be both the stream and the report", report_file);
     cli_redirect(opts.heat, true); /* report errors in the name now */
@@ -481,7 +482,7 @@ static void parse_options(int argc, char **argv, char ***operands)
 /* With --quiet there is no report unless it was requested by name. */
 static bool wants_report(void)
 {
-    return !replaces_report() && (!cli.quiet || report_file || cli.json);
+    return !replaces_report() && (!cli_quiet() || report_file || cli_json());
 }
 
 static void report_all(report *r, const side *truth, const side *result, const findings *found, double errors[4])
@@ -553,7 +554,7 @@ int main(int argc, char **argv)
     if (opts.frames) report_gap(r);
     report_join(r, frames);
     if (wants_report()) {
-        report_print(r, cli_text_open(), cli.json);
+        report_print(r, cli_text_open(), cli_json());
         cli_text_end();
     }
     report_free(&r);

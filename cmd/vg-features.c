@@ -57,7 +57,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     vg_err e;
     (void)in;
     cli_need_vertices(h, "the input");
-    vg_feature_options o = {.nine = opts.nine, .plain = opts.plain, .threads = cli.threads};
+    vg_feature_options o = {.nine = opts.nine, .plain = opts.plain, .threads = cli_threads()};
     if (vg_featurer_new(&w->featurer, &h->body.mesh, h->body.reference, &o, &e) < 0) cli_die(&e);
     w->h = h, w->stats = vg_featurer_get_stats(w->featurer);
     w->diagonal = vg_diagonal(h->body.reference, h->body.mesh.nv);
@@ -70,7 +70,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     }
     w->roots = lists(w->most, 4);
     w->centroids = lists(w->most, 3 * w->stats.parts);
-    if (cli.verbose) w->back = lists(w->most, 3 * h->body.mesh.nv);
+    if (cli_verbose()) w->back = lists(w->most, 3 * h->body.mesh.nv);
 }
 
 /* ---- frames ---- */
@@ -104,7 +104,7 @@ static void measure_batch(void *context, size_t n, vg_frame *in)
     const double **poses = cli_allocate(n, sizeof *poses, "a batch of poses");
     for (size_t i = 0; i < n; i++) poses[i] = in[i].values;
     if (vg_featurer_measure(w->featurer, n, poses, w->values, w->roots, w->centroids, &e) < 0) cli_die(&e);
-    if (cli.verbose) check_way_back(w, n, poses);
+    if (cli_verbose()) check_way_back(w, n, poses);
     for (size_t i = 0; i < n; i++) {
         vg_frame *f = &w->out[i];
         if (vg_frame_label(f, &in[i], &e) < 0) cli_die(&e);
@@ -144,7 +144,7 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_source *s = cli_source(operands, n);
-    work w = {.most = 8 * (size_t)cli.threads};
+    work w = {.most = 8 * (size_t)cli_threads()};
     const step measure = {.batch = w.most, .unit = "poses", .init = prepare, .process = measure_batch, .finish = report_features};
     step_run(&measure, &w, s);
     clear_work(&w);

@@ -120,8 +120,8 @@ static void report_fit(patch_fit *x)
     vg_err e;
     const vg_head *h = x->f->h;
     double d = vg_diagonal(h->body.reference, h->body.mesh.nv);
-    if (cli.quiet || !(d > 0)) return;
-    if (vg_player_new(&x->player, &h->body, &h->map, false, cli.threads, &e) < 0) cli_die(&e);
+    if (cli_quiet() || !(d > 0)) return;
+    if (vg_player_new(&x->player, &h->body, &h->map, false, cli_threads(), &e) < 0) cli_die(&e);
     for (size_t i = 0; i < FITTING_BATCH; i++) {
         x->transforms[i] = cli_allocate(7 * h->map.n, sizeof(double), "the report");
         x->vertices[i] = cli_allocate(3 * h->body.mesh.nv, sizeof(double), "the report");
@@ -153,7 +153,7 @@ static void fit_patches(vg_source *s)
     patch_fit x = {.f = &f};
     vg_patches pieces;
     vg_map map;
-    if (vg_head_prepare_vectors(h, &e) < 0 || vg_map_fitter_new(&x.fitter, h, opts.rig.hold, cli.threads, &e) < 0)
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_map_fitter_new(&x.fitter, h, opts.rig.hold, cli_threads(), &e) < 0)
         cli_die(&e);
     fitting_collect(&f, s, opts.rig.holdout, "fit a map to");
     fitting_pass(&f, is_fitted, add_batch, &x);

@@ -64,7 +64,6 @@ static const cli_option options[] = {
      .least = 1, .most = 1000},
     {"report", 0, "FILE", "write what was fitted, and every frame's error, to FILE; '-' is standard output",
      .text = &opts.report},
-    {"json", 0, NULL, "the report as JSON", .flag = &cli.json},
     {.name = NULL}};
 
 static const cli_program program = {
@@ -74,6 +73,7 @@ static const cli_program program = {
     .options = options,
     .most_operands = SIZE_MAX,
     .writes_stream = true,
+    .reports_json = true,
     .threaded = true};
 
 /* ---- options ---- */
@@ -155,7 +155,7 @@ static void write_report(const vg_signal *s, const vg_signal_stats *r)
     report_layout(t, s, r);
     report_frames(t, s, r);
     cli_redirect(opts.report, false);
-    report_print(t, cli_text_open(), cli.json);
+    report_print(t, cli_text_open(), cli_json());
     cli_text_end();
     report_free(&t);
 }
@@ -203,14 +203,14 @@ static void pick_frames(const vg_head *h, poses *p)
     frame = cli_allocate(n, sizeof *frame, "frames");
     left = cli_allocate(n, sizeof *left, "frames");
     cli_working("choosing poses");
-    if (vg_signal_pick(&h->body, p->values, p->n, n, cli.threads, frame, left, &e) < 0) cli_die(&e);
+    if (vg_signal_pick(&h->body, p->values, p->n, n, cli_threads(), frame, left, &e) < 0) cli_die(&e);
     report *t = report_new();
     char *list = list_frames(frame, n);
     report_put(t, "take", "take", report_text(list));
     report_table(t, "frames", "", false, columns, 3);
     for (size_t i = 0; i < n; i++)
         report_row(t, (report_value[]){report_count(frame[i]), report_text(p->names[frame[i]]), report_number(left[i])});
-    report_print(t, cli_text_open(), cli.json);
+    report_print(t, cli_text_open(), cli_json());
     cli_text_end();
     report_free(&t);
     free(list);
@@ -227,7 +227,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_signal_options o = {.tolerance = opts.tolerance, .m = (size_t)opts.m, .l = (size_t)opts.l, .k = (size_t)opts.k,
                            .root = opts.root == 0, .space = (vg_space)(VG_SPACE_VERTICES + opts.space), .gain = opts.sites == 1, .pins = opts.pins, .npins = opts.npins,
-                           .bits = (size_t[]){64, 32, 16}[opts.basis], .threads = cli.threads};
+                           .bits = (size_t[]){64, 32, 16}[opts.basis], .threads = cli_threads()};
     parse_layout(&o);
     vg_source *source = cli_source(operands, n);
     vg_head *h = vg_source_head(source);

@@ -57,7 +57,7 @@ static vg_generator *make_generator(const vg_network *n, const vg_head *h)
     vg_err e;
     if (cli_given("seed") && !cli_given("diversity")) opts.diversity = 0.3;
     vg_generate_options o = {.stay = opts.root == 1, .diversity = opts.diversity, .seed = (uint64_t)opts.seed,
-                             .optimise = opts.optimise, .merge = opts.merge, .threads = cli.threads};
+                             .optimise = opts.optimise, .merge = opts.merge, .threads = cli_threads()};
     if (vg_generator_new(&g, n, &h->body.mesh, h->body.reference, &o, &e) < 0) cli_die(&e);
     return g;
 }

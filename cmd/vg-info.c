@@ -204,7 +204,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
 static void report_check(report *r)
 {
     report_put(r, "whole", NULL, report_flag(true));
-    if (!cli.quiet) report_note(r, "whole");
+    if (!cli_quiet()) report_note(r, "whole");
 }
 
 static void report_digest(report *r, const contents *c)
@@ -299,12 +299,12 @@ int main(int argc, char **argv)
     const char *operand = n && strcmp(operands[0], "-") ? operands[0] : NULL;
     if (opts.check) report_check(r);
     else if (opts.digest) report_digest(r, &c);
-    else if ((!list || cli.json) && !prints_alone()) report_all(r, operand, vg_source_head(s), &c);
+    else if ((!list || cli_json()) && !prints_alone()) report_all(r, operand, vg_source_head(s), &c);
     if (list) report_join(r, list);
     if (opts.weights) print_weights(vg_source_head(s), operand);
     else if (opts.vertices) print_vertices(vg_source_head(s));
     else if (opts.positions || opts.curve) print_signal(vg_source_head(s), operand);
-    else report_print(r, cli_text_open(), cli.json);
+    else report_print(r, cli_text_open(), cli_json());
     cli_text_end();
     report_free(&r);
     vg_source_close(&s);

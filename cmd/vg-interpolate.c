@@ -203,7 +203,7 @@ static void interpolate(void *context)
         cli_stop(VG_EINPUT, "there is %s in the input, but a path needs at least two", p->n ? "one pose" : "no pose");
     place_keys(p);
     const vg_path_options o = {.kind = p->kind, .nanchors = p->h->nanchors, .smooth = opts.smooth,
-                               .threads = cli.threads};
+                               .threads = cli_threads()};
     if (vg_path_new(&path, p->g, p->h->body.reference, p->keys, p->n, &o, &e) < 0) cli_die(&e);
     write_poses(p, path);
     report_path(path);

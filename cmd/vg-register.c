@@ -248,7 +248,7 @@ static void bind_target(vg_head *source, vg_head *target)
     vg_correspondence c;
     const vg_body *s = &source->body, *t = &target->body;
     cli_working("binding");
-    if (vg_bind(&c, &s->mesh, s->reference, &t->mesh, t->reference, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_bind(&c, &s->mesh, s->reference, &t->mesh, t->reference, cli_threads(), &e) < 0) cli_die(&e);
     double farthest = 0, D = vg_diagonal(s->reference, s->mesh.nv);
     for (size_t f = 0; f < c.target_nf; f++) farthest = c.distance[f] > farthest ? c.distance[f] : farthest;
     cli_note("%zu faces are bound to the source, the farthest at %.3g %% of D from it", c.target_nf, 100 * farthest / D);
@@ -272,7 +272,7 @@ static void pair_meshes(vg_head *source, vg_head *target)
                             .all_components = opts.all_components,
                             .source_uv = opts.uv ? &source->body.attributes : NULL,
                             .target_uv = opts.uv ? &target->body.attributes : NULL,
-                            .threads = cli.threads};
+                            .threads = cli_threads()};
     read_pairs(&in, &markers, &seeds);
     warn_shared(&markers, false);
     warn_shared(&markers, true);

@@ -39,7 +39,7 @@ static void retarget(vg_head *h)
     cli_load(&target, opts.onto, "mesh");
     cli_working("retargeting");
     if (vg_mesh_same(&h->body.mesh, "the map", &target.body.mesh, name, &e) < 0 ||
-        vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &map, &rig, target.body.reference, &e) < 0 ||
+        vg_map_retarget(h, target.body.reference, opts.morph, cli_threads(), &map, &rig, target.body.reference, &e) < 0 ||
         vg_head_merge_trace(h, &target, &e) < 0)
         cli_die(&e);
     vg_head_put(h, &map, "map");

@@ -54,7 +54,7 @@ int main(int argc, char **argv)
     vg_err e;
     vg_segmenter *s;
     vg_segment_stats report;
-    if (vg_segmenter_new(&s, &h->body.mesh, h->body.reference, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_segmenter_new(&s, &h->body.mesh, h->body.reference, cli_threads(), &e) < 0) cli_die(&e);
     if (!fitting_stream(source, add_batch, s))
         cli_stop(VG_EINPUT, "the input has no poses: rotations cannot be compared");
     vg_head_drop(h, "patches");

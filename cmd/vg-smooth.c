@@ -90,7 +90,7 @@ static void make_smoother(timing *t, double each)
 {
     double fallback = 1.0 / VG_FPS, span = cli_given("frames") ? opts.frames : cli_given("seconds") ? opts.seconds : 0.1;
     if (!cli_given("frames") && each < 0) cli_stop(VG_EINPUT, "the times of the frames do not increase: use '--frames'");
-    vg_smoother_options o = {.filter = (vg_filter)opts.filter, .threads = cli.threads};
+    vg_smoother_options o = {.filter = (vg_filter)opts.filter, .threads = cli_threads()};
     o.span = span_in_frames(span, each > 0 ? each : fallback);
     o.root_span = cli_given("root") ? span_in_frames(opts.root, each > 0 ? each : fallback) : o.span;
     size_t reach = make_filter(t, &o);
@@ -252,7 +252,7 @@ static void prepare_together(void *context, vg_head *h, vg_frame *in)
     (void)in;
     t->h = h;
     cli_need_vertices(h, "the input");
-    if (vg_region_filter_new(&t->filter, &h->body.mesh, h->body.reference, cli.threads, &e) < 0 ||
+    if (vg_region_filter_new(&t->filter, &h->body.mesh, h->body.reference, cli_threads(), &e) < 0 ||
         vg_poses_new(&t->poses, h, limit, &e) < 0)
         cli_die(&e);
 }

@@ -120,7 +120,7 @@ static void make_plain(work *w, uint32_t *held, size_t nheld)
     machine *m = &w->plain;
     *m = (machine){.held = held, .nheld = nheld};
     cli_working("factorising");
-    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->body.reference, w->weights, cli.threads, &e) < 0 ||
+    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->body.reference, w->weights, cli_threads(), &e) < 0 ||
         (opts.fit == 0 && vg_robust_new(&w->robust, m->solver, (size_t)opts.rounds, opts.eps, &e) < 0))
         cli_die(&e);
     equip(m);
@@ -389,7 +389,7 @@ static void make_waiting(work *w)
     vg_err e;
     w->most = vg_solver_batch(w->plain.solver);
     w->waiting = cli_allocate(w->most, sizeof *w->waiting, "a batch of poses");
-    w->pinned = cli_allocate(KEPT + w->most + (size_t)cli.threads, sizeof *w->pinned, "a batch of poses");
+    w->pinned = cli_allocate(KEPT + w->most + (size_t)cli_threads(), sizeof *w->pinned, "a batch of poses");
     for (size_t i = 0; i < w->most; i++) {
         waiting *p = &w->waiting[i];
         p->rhs = cli_allocate(3 * w->h->body.mesh.nv, sizeof *p->rhs, "a batch of poses");
@@ -405,8 +405,8 @@ static void make_waiting(work *w)
 static void make_room_for_vertices(work *w, vg_frame *in)
 {
     vg_err e;
-    w->vectors = cli_allocate((size_t)cli.threads, sizeof *w->vectors, "a batch of poses");
-    for (size_t i = 0; i < (size_t)cli.threads && w->kind == VG_VERTICES; i++) {
+    w->vectors = cli_allocate((size_t)cli_threads(), sizeof *w->vectors, "a batch of poses");
+    for (size_t i = 0; i < (size_t)cli_threads() && w->kind == VG_VERTICES; i++) {
         w->vectors[i] = cli_allocate(3 * vg_graph_corners(w->g), sizeof **w->vectors, "a batch of poses");
         if (vg_frame_shape(&in[i], w->h, &e) < 0) cli_die(&e);
     }
@@ -456,7 +456,7 @@ static void clear_work(work *w)
         free(w->waiting[i].misfit);
     }
     free(w->waiting);
-    for (size_t i = 0; i < (size_t)cli.threads; i++) free(w->vectors[i]);
+    for (size_t i = 0; i < (size_t)cli_threads(); i++) free(w->vectors[i]);
     free(w->vectors);
     vg_graph_free(&w->g);
 }
@@ -481,7 +481,7 @@ int main(int argc, char **argv)
         vg_source_close(&s);
         cli_finish(0);
     }
-    const step solve = {.batch = (size_t)cli.threads, /* loaded in parallel */
+    const step solve = {.batch = (size_t)cli_threads(), /* loaded in parallel */
                         .unit = "poses",
                         .init = prepare,
                         .process = take_batch,

@@ -128,7 +128,7 @@ static vg_train_options choose_options(void)
     if (opts.losses[1] >= 0) o.divergence = opts.losses[1];
     if (opts.losses[2] >= 0) o.decay = opts.losses[2];
     o.hold = opts.hold, o.hold_at = opts.hold_at;
-    o.nine = opts.nine, o.seed = (uint64_t)opts.seed, o.threads = cli.threads;
+    o.nine = opts.nine, o.seed = (uint64_t)opts.seed, o.threads = cli_threads();
     return o;
 }
 
@@ -340,7 +340,7 @@ static void report_errors(vg_trainer *t, const vg_train_state *s)
 /* Other outputs must have different names from the network. */
 static void check_outputs(void)
 {
-    const char *names[] = {cli.output, opts.checkpoint, opts.log};
+    const char *names[] = {cli_output(), opts.checkpoint, opts.log};
     vg_err e;
     for (int i = 1; i < 3; i++) {
         if (!names[i]) continue;
@@ -356,7 +356,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_train_options o = choose_options();
     is_first = vg_train_process() == 0;
-    cli.quiet |= !is_first;
+    if (!is_first) cli_be_quiet();
     vg_source *s = cli_source(operands, n ? 1 : 0);
     vg_head *h = vg_source_head(s);
     vg_trainer *t;

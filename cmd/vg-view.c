@@ -142,7 +142,7 @@ static vg_sheet_options sheet_options(void)
                           .edges = opts.edges,
                           .ground = opts.ground, .fit = choose_fit(), .silhouettes = opts.silhouettes,
                           .zoom = opts.zoom, .tint = choose_tint(), .centred = opts.centred, .scale = opts.scale,
-                          .threads = cli.threads};
+                          .threads = cli_threads()};
     parse_size(opts.size ? opts.size : "360x360", &o);
     parse_view(opts.view, &o);
     o.z_up = opts.up == 1;
@@ -153,13 +153,13 @@ static vg_sheet_options sheet_options(void)
 static void choose_kind(void)
 {
     struct stat st;
-    bool named = cli.output && (stat(cli.output, &st) || S_ISREG(st.st_mode)); /* not a pipe or device */
-    bool html = named && (cli_ends_with(cli.output, ".html") || cli_ends_with(cli.output, ".htm"));
-    bool webp = named && cli_ends_with(cli.output, ".webp");
-    opts.svg = opts.format ? opts.kind == 3 : named && cli_ends_with(cli.output, ".svg");
-    if (named && !html && !webp && !opts.svg && !cli_ends_with(cli.output, ".png") && !opts.format)
+    bool named = cli_output() && (stat(cli_output(), &st) || S_ISREG(st.st_mode)); /* not a pipe or device */
+    bool html = named && (cli_ends_with(cli_output(), ".html") || cli_ends_with(cli_output(), ".htm"));
+    bool webp = named && cli_ends_with(cli_output(), ".webp");
+    opts.svg = opts.format ? opts.kind == 3 : named && cli_ends_with(cli_output(), ".svg");
+    if (named && !html && !webp && !opts.svg && !cli_ends_with(cli_output(), ".png") && !opts.format)
         cli_usage("cannot write '%s': the name must end in .html, .png or .webp, of a network also in .svg, or be '-' for standard output",
-                  cli.output);
+                  cli_output());
     opts.page = opts.format ? opts.kind == 1 : html;
     opts.animated = opts.format ? opts.kind == 2 : webp;
     if (!opts.animated && cli_given("turn")) cli_usage("option '--turn' applies to an animation: use -o FILE.webp");
@@ -178,7 +178,7 @@ static void choose_kind(void)
     if (opts.pick && opts.nbeside != 1) cli_usage("option '--pick' applies to two meshes: give --beside once");
     if (opts.pick && !cli_given("view")) opts.view = "front";
     if (!opts.page && opts.title) cli_usage("option '--title' applies to a page: use -o FILE.html");
-    if (!cli.output && isatty(STDOUT_FILENO))
+    if (!cli_output() && isatty(STDOUT_FILENO))
         cli_usage("a %s is not written to a terminal: use -o FILE.html, FILE.png or FILE.webp",
                   opts.page ? "page" : "picture");
 }
@@ -462,7 +462,7 @@ static void make_plane(cast *c)
     if (opts.patches) take_patches(&c->result);
     while (next_frame(&c->result)) continue; /* to the end, so that damage is seen */
     FILE *out = cli_text_open();
-    if (vg_plane_write(c->result.head, &plane, fileno(out), cli.output ? cli.output : "standard output", &e) < 0) cli_die(&e);
+    if (vg_plane_write(c->result.head, &plane, fileno(out), cli_output() ? cli_output() : "standard output", &e) < 0) cli_die(&e);
     cli_text_end();
 }
 
@@ -497,7 +497,7 @@ static void make_sheet(cast *c)
     if (shows_reference(c)) put_reference(&c->result, sheet_frame, sheet);
     check_counts(c);
     FILE *out = cli_text_open();
-    if (vg_sheet_write(sheet, fileno(out), cli.output ? cli.output : "standard output", &e) < 0) cli_die(&e);
+    if (vg_sheet_write(sheet, fileno(out), cli_output() ? cli_output() : "standard output", &e) < 0) cli_die(&e);
     cli_text_end();
     vg_sheet_free(&sheet);
 }
@@ -581,7 +581,7 @@ static void make_signal_page(cast *c)
     if (opts.patches) take_patches(&c->result);
     while (next_frame(&c->result)) continue; /* to the end, so that damage is seen */
     FILE *out = cli_text_open();
-    if (vg_page_new(&page, fileno(out), cli.output ? cli.output : "standard output", &o, &e) < 0) cli_die(&e);
+    if (vg_page_new(&page, fileno(out), cli_output() ? cli_output() : "standard output", &o, &e) < 0) cli_die(&e);
     add_sequence(page, &c->result);
     add_sampled(page, &c->result);
     if (vg_page_end(page, &stats, &e) < 0) cli_die(&e);
@@ -598,7 +598,7 @@ static void make_page(cast *c)
     vg_err e;
     if (opts.patches) take_patches(&c->result);
     FILE *out = cli_text_open();
-    if (vg_page_new(&page, fileno(out), cli.output ? cli.output : "standard output", &o, &e) < 0) cli_die(&e);
+    if (vg_page_new(&page, fileno(out), cli_output() ? cli_output() : "standard output", &o, &e) < 0) cli_die(&e);
     add_sequence(page, &c->result);
     if (opts.against) add_sequence(page, &c->truth);
     for (size_t i = 0; i < opts.nbeside; i++) add_sequence(page, &c->beside[i]);
