@@ -9,7 +9,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { PACK = 8 }; /* steps whose gradients of a full layer are summed in one product */
+/* Gradients of a full layer are summed over as many steps in one product as need this many bytes, and PACK at least. */
+enum { PACK = 4, PACK_BYTES = 40 << 20, ROWS_AT_ONCE = 192 };
 
 #define FLAT(rows) ((real *)(rows))
 #define FLAT_IN(rows) ((const real *)(rows))
@@ -51,12 +52,13 @@ static size_t lay_out(net_chains *c, net_lanes *base)
 int net_chains_make(net_chains *c, const vgi_shape *s, size_t steps, vg_err *e)
 {
     *c = (net_chains){.shape = s, .steps = steps};
-    size_t widest = s->front == VGI_FRONT_MESH ? 2 * PACK * (s->numbers + 3 * s->latent) : 0;
+    size_t fit = PACK_BYTES / (2 * s->numbers * sizeof *c->state), most_steps = fit < PACK ? PACK : fit;
+    c->packed = steps - 1 < most_steps ? steps - 1 : most_steps;
+    size_t widest = s->front == VGI_FRONT_MESH ? c->packed * (2 * s->numbers + 6 * s->latent + 2 * ROWS_AT_ONCE) : 0;
     for (size_t l = 0; l < s->layers; l++)
         widest = most(widest, steps * (vgi_shape_input(s, l) + 5 * s->hidden + s->numbers * (s->front == VGI_FRONT_LINEAR)));
-    c->pack_size = widest * NET_LANES;
     c->memory = net_array(lay_out(c, NULL), e);
-    c->pack = c->memory ? vgi_array_raw(c->pack_size, sizeof *c->pack, e) : NULL;
+    c->pack = c->memory ? FLAT(net_array(widest, e)) : NULL;
     if (!c->pack) return net_chains_clear(c), VG_ENOMEM;
     lay_out(c, c->memory);
     return VG_OK;
@@ -117,8 +119,7 @@ static net_lanes *convolve_out(net_chains *c, const net_drive *d, const net_lane
     const vgi_shape *s = c->shape;
     net_neighbours g = neighbours(s);
     net_lanes *x = c->frame[s->convolutions];
-    NET_GEMM(false, false, s->numbers, NET_LANES, s->latent, d->parameters + s->full, s->latent, FLAT_IN(top),
-             NET_LANES, 0, FLAT(x), NET_LANES);
+    net_multiply(s->numbers, s->latent, d->parameters + s->full, top, false, x);
     if (!s->convolutions) net_tanh(x, s->numbers);
     for (size_t i = 0; i < s->convolutions; i++) {
         net_convolution one = layer(d, s->convolutions - 1 - i, true);
@@ -132,8 +133,7 @@ static void add_spread(net_chains *c, const net_drive *d, size_t t, const net_la
 {
     const vgi_shape *s = c->shape;
     net_lanes *spread = c->spread + t * s->latent, *noise = c->noise + t * s->latent;
-    NET_GEMM(true, false, s->latent, NET_LANES, s->numbers, d->parameters + s->variance, s->latent, FLAT_IN(x),
-             NET_LANES, 0, FLAT(spread), NET_LANES);
+    net_multiply_turned(s->numbers, s->latent, d->parameters + s->variance, x, false, spread);
     for (size_t k = 0; k < s->latent; k++)
         for (int i = 0; i < NET_LANES; i++) {
             real v = spread[k][i] + d->parameters[s->variance_bias + k];
@@ -152,8 +152,7 @@ static void encode_frame(net_chains *c, const net_drive *d, size_t t, const net_
         return;
     }
     x = convolve_in(c, d, x);
-    NET_GEMM(true, false, s->latent, NET_LANES, s->numbers, d->parameters + s->full, s->latent, FLAT_IN(x), NET_LANES,
-             0, FLAT(latent), NET_LANES);
+    net_multiply_turned(s->numbers, s->latent, d->parameters + s->full, x, false, latent);
     memcpy(in, latent, s->latent * sizeof *in);
     if (s->uncertain) add_spread(c, d, t, x, in);
 }
@@ -167,8 +166,7 @@ static void recur(net_chains *c, const net_drive *d, size_t t)
         net_lanes *gates = c->gates[l] + t * 4 * h, *cell = c->cell[l] + t * h, *next = c->input[l] + (t + 1) * rows + in;
         const real *bias = d->parameters + s->gates_bias[l];
         for (size_t k = 0; k < 4 * h; k++) gates[k] = (net_lanes){0} + bias[k];
-        NET_GEMM(true, false, 4 * h, NET_LANES, rows, d->parameters + s->gates[l], 4 * h,
-                 FLAT_IN(c->input[l] + t * rows), NET_LANES, 1, FLAT(gates), NET_LANES);
+        net_multiply_turned(rows, 4 * h, d->parameters + s->gates[l], c->input[l] + t * rows, true, gates);
         net_gates(h, gates, cell, cell + h, next);
         net_lanes *above = l + 1 < s->layers ? c->input[l + 1] + t * input_rows(s, l + 1) : c->top + t * h;
         memcpy(above, next, h * sizeof *next);
@@ -186,8 +184,7 @@ static void decode_frame(net_chains *c, const net_drive *d, size_t t, net_lanes 
         return;
     }
     net_lanes *y = c->frame[0];
-    NET_GEMM(true, false, s->numbers, NET_LANES, s->hidden, d->parameters + s->full, s->numbers, FLAT_IN(top),
-             NET_LANES, 0, FLAT(y), NET_LANES);
+    net_multiply_turned(s->hidden, s->numbers, d->parameters + s->full, top, false, y);
     for (size_t k = 0; k < s->numbers; k++)
         next[k] += (y[k] + d->parameters[s->full_bias + k]) * d->scale_out[k];
 }
@@ -250,12 +247,11 @@ void net_chains_forward(net_chains *c, const net_drive *d)
 
 /* ---- backward ---- */
 
-/* `count` steps of rows, `stride` rows apart, as one matrix whose rows are that row in all steps */
-static void pack_rows(const net_lanes *from, size_t stride, size_t rows, size_t count, real *to)
+/* `count` steps of rows, `stride` rows apart, as columns of a matrix whose rows are `apart` numbers apart */
+static void pack_rows(const net_lanes *from, size_t stride, size_t rows, size_t count, real *to, size_t apart)
 {
-    for (size_t t = 0; t < count; t++)
-        for (size_t k = 0; k < rows; k++)
-            memcpy(to + (k * count + t) * NET_LANES, from + t * stride + k, sizeof *from);
+    for (size_t k = 0; k < rows; k++)
+        for (size_t t = 0; t < count; t++) memcpy(to + k * apart + t * NET_LANES, from + t * stride + k, sizeof *from);
 }
 
 static void add_sums(const net_lanes *from, size_t stride, size_t rows, size_t count, real *to)
@@ -270,24 +266,45 @@ static void add_sums(const net_lanes *from, size_t stride, size_t rows, size_t c
 /* Steps collected for one product with a full layer. */
 typedef struct waiting {
     size_t steps;
-    real *in, *out;            /* numbers x (PACK * 8): input and output frames of the full layer */
-    real *latent, *top, *spread; /* latent x (PACK * 8): gradients, h, gradients */
+    net_lanes *in, *out;             /* numbers each: input and gradient of the output of the full layer */
+    net_lanes *latent, *spread, *top; /* latent each: gradients, gradients, h */
+    real *left, *right, *right_spread; /* workspace: the steps side by side */
 } waiting;
 
-static void put_waiting(real *to, size_t step, const net_lanes *rows, size_t n)
+static waiting begin_waiting(net_chains *c)
 {
-    for (size_t k = 0; k < n; k++) memcpy(to + (k * PACK + step) * NET_LANES, rows + k, sizeof *rows);
+    const vgi_shape *s = c->shape;
+    size_t columns = c->packed * NET_LANES;
+    waiting w = {.in = (net_lanes *)c->pack};
+    w.out = w.in + c->packed * s->numbers;
+    w.latent = w.out + c->packed * s->numbers;
+    w.spread = w.latent + c->packed * s->latent, w.top = w.spread + c->packed * s->latent;
+    w.left = FLAT(w.top + c->packed * s->latent);
+    w.right = w.left + 2 * ROWS_AT_ONCE * columns, w.right_spread = w.right + 2 * s->latent * columns;
+    return w;
 }
 
+static void put_waiting(net_lanes *to, size_t step, const net_lanes *rows, size_t n)
+{
+    memcpy(to + step * n, rows, n * sizeof *rows);
+}
+
+/* Add the gradients of the steps collected: of the layer as the encoder and as the decoder, and of the variance. */
 static void multiply_packed(const vgi_shape *s, waiting *w, real *gradient)
 {
-    size_t k = w->steps * NET_LANES, apart = PACK * NET_LANES;
-    if (k) {
-        NET_GEMM(false, true, s->numbers, s->latent, k, w->in, apart, w->latent, apart, 1, gradient + s->full, s->latent);
-        NET_GEMM(false, true, s->numbers, s->latent, k, w->out, apart, w->top, apart, 1, gradient + s->full, s->latent);
+    size_t n = s->numbers, latent = s->latent, k = w->steps * NET_LANES;
+    pack_rows(w->latent, latent, latent, w->steps, w->right, 2 * k);
+    pack_rows(w->top, latent, latent, w->steps, w->right + k, 2 * k);
+    if (s->uncertain) pack_rows(w->spread, latent, latent, w->steps, w->right_spread, k);
+    for (size_t first = 0; k && first < n; first += ROWS_AT_ONCE) {
+        size_t rows = n - first < ROWS_AT_ONCE ? n - first : ROWS_AT_ONCE;
+        pack_rows(w->in + first, n, rows, w->steps, w->left, 2 * k);
+        pack_rows(w->out + first, n, rows, w->steps, w->left + k, 2 * k);
+        NET_GEMM(false, true, rows, latent, 2 * k, w->left, 2 * k, w->right, 2 * k, 1,
+                 gradient + s->full + first * latent, latent);
         if (s->uncertain)
-            NET_GEMM(false, true, s->numbers, s->latent, k, w->in, apart, w->spread, apart, 1, gradient + s->variance,
-                     s->latent);
+            NET_GEMM(false, true, rows, latent, k, w->left, 2 * k, w->right_spread, k, 1,
+                     gradient + s->variance + first * latent, latent);
     }
     w->steps = 0;
 }
@@ -305,8 +322,8 @@ typedef struct backward {
     waiting w;
 } backward;
 
-/* dh of the last layer from the gradient of the change */
-static void decode_back(backward *b, size_t t, net_lanes *dtop)
+/* dh of the last layer from the gradient of the change; x: input of step t */
+static void decode_back(backward *b, size_t t, const net_lanes *x, net_lanes *dtop)
 {
     net_chains *c = b->c;
     const vgi_shape *s = c->shape;
@@ -316,15 +333,13 @@ static void decode_back(backward *b, size_t t, net_lanes *dtop)
         for (size_t k = 0; k < s->numbers; k++) dy[k] = b->dstate[k] * b->d->scale_out[k];
         memcpy(c->latent + t * s->latent, dy, s->numbers * sizeof *dy); /* the same number of rows; the mean is no
                                                                            longer needed */
-        NET_GEMM(false, false, s->hidden, NET_LANES, s->numbers, b->d->parameters + s->full, s->numbers, FLAT_IN(dy),
-                 NET_LANES, 0, FLAT(dtop), NET_LANES);
+        net_multiply(s->hidden, s->numbers, b->d->parameters + s->full, dy, false, dtop);
         return;
     }
     net_neighbours g = neighbours(s);
-    const net_lanes *y = convolve_out(c, b->d, c->top + t * s->hidden);
+    if (s->convolutions) convolve_out(c, b->d, c->top + t * s->hidden);
     memcpy(dy, b->dstate, s->numbers * sizeof *dy);
-    if (!s->convolutions)
-        for (size_t k = 0; k < s->numbers; k++) dy[k] *= (real)1 - y[k] * y[k];
+    if (!s->convolutions) net_tanh_back(s->numbers, c->state + (t + 1) * s->numbers, x, dy);
     for (size_t k = 0; k < s->convolutions; k++) {
         size_t out = 2 * s->convolutions - k;
         net_convolution one = layer(b->d, k, true);
@@ -335,8 +350,7 @@ static void decode_back(backward *b, size_t t, net_lanes *dtop)
     }
     put_waiting(b->w.out, b->w.steps, dy, s->numbers);
     put_waiting(b->w.top, b->w.steps, c->top + t * s->hidden, s->hidden);
-    NET_GEMM(true, false, s->hidden, NET_LANES, s->numbers, b->d->parameters + s->full, s->latent, FLAT_IN(dy),
-             NET_LANES, 0, FLAT(dtop), NET_LANES);
+    net_multiply_turned(s->numbers, s->hidden, b->d->parameters + s->full, dy, false, dtop);
 }
 
 /* dtop: gradient of h of the last layer; gradients of gates overwrite the gates */
@@ -353,8 +367,7 @@ static void recur_back(backward *b, size_t t, net_lanes *dtop)
         for (size_t k = 0; k < h; k++) dtop[k] += b->dh[l][k];
         net_gates_back(h, gates, cell, cell + h, dtop, b->dc[l], dgates);
         memcpy(gates, dgates, 4 * h * sizeof *gates);
-        NET_GEMM(false, false, rows, NET_LANES, 4 * h, b->d->parameters + s->gates[l], 4 * h, FLAT_IN(gates),
-                 NET_LANES, 0, FLAT(din), NET_LANES);
+        net_multiply(rows, 4 * h, b->d->parameters + s->gates[l], gates, false, din);
         memcpy(b->dh[l], din + in, h * sizeof *din);
         memcpy(l ? dtop : b->dlatent, din, in * sizeof *din);
     }
@@ -395,12 +408,9 @@ static void encode_back(backward *b, size_t t, const net_lanes *x)
         put_waiting(b->w.spread, b->w.steps, b->dspread, s->latent);
         add_sums(b->dspread, 0, s->latent, 1, b->gradient + s->variance_bias);
     }
-    if (++b->w.steps == PACK) multiply_packed(s, &b->w, b->gradient);
-    NET_GEMM(false, false, s->numbers, NET_LANES, s->latent, b->d->parameters + s->full, s->latent,
-             FLAT_IN(b->dlatent), NET_LANES, 0, FLAT(dx), NET_LANES);
-    if (s->uncertain)
-        NET_GEMM(false, false, s->numbers, NET_LANES, s->latent, b->d->parameters + s->variance, s->latent,
-                 FLAT_IN(b->dspread), NET_LANES, 1, FLAT(dx), NET_LANES);
+    if (++b->w.steps == c->packed) multiply_packed(s, &b->w, b->gradient);
+    net_multiply(s->numbers, s->latent, b->d->parameters + s->full, b->dlatent, false, dx);
+    if (s->uncertain) net_multiply(s->numbers, s->latent, b->d->parameters + s->variance, b->dspread, true, dx);
     for (size_t k = s->convolutions; k-- > 0;) {
         net_convolution one = layer(b->d, k, false);
         net_convolve_back(&g, &one, k ? c->frame[k - 1] : x, c->frame[k], dx, other, b->gradient + s->own[k],
@@ -421,15 +431,15 @@ static void finish_gradients(backward *b)
     for (size_t l = 0; l < s->layers; l++) {
         size_t rows = input_rows(s, l);
         real *in = c->pack, *out = in + rows * k;
-        pack_rows(c->input[l], rows, rows, steps, in);
-        pack_rows(c->gates[l], 4 * h, 4 * h, steps, out);
+        pack_rows(c->input[l], rows, rows, steps, in, k);
+        pack_rows(c->gates[l], 4 * h, 4 * h, steps, out, k);
         NET_GEMM(false, true, rows, 4 * h, k, in, k, out, k, 1, b->gradient + s->gates[l], 4 * h);
         add_sums(c->gates[l], 4 * h, 4 * h, steps, b->gradient + s->gates_bias[l]);
     }
     if (s->front == VGI_FRONT_MESH) return;
     real *top = c->pack, *out = top + h * k;
-    pack_rows(c->top, h, h, steps, top);
-    pack_rows(c->latent, s->numbers, s->numbers, steps, out);
+    pack_rows(c->top, h, h, steps, top, k);
+    pack_rows(c->latent, s->numbers, s->numbers, steps, out, k);
     NET_GEMM(false, true, h, s->numbers, k, top, k, out, k, 1, b->gradient + s->full, s->numbers);
     add_sums(c->latent, s->numbers, s->numbers, steps, b->gradient + s->full_bias);
 }
@@ -447,10 +457,7 @@ static void prepare_backward(backward *b)
     }
     b->dstate = c->frame[last - 3], b->dinput = c->frame[last - 4];
     if (s->front != VGI_FRONT_MESH) return;
-    size_t columns = PACK * NET_LANES;
-    b->w = (waiting){.in = c->pack, .out = c->pack + s->numbers * columns};
-    b->w.latent = b->w.out + s->numbers * columns;
-    b->w.top = b->w.latent + s->latent * columns, b->w.spread = b->w.top + s->latent * columns;
+    b->w = begin_waiting(c);
 }
 
 /* Gradient of frame t from frame t + 1 and, through a skeleton, from frame t + 2: from b->dstate and `later`. */
@@ -478,9 +485,10 @@ void net_chains_backward(net_chains *c, const net_drive *d, void (*pull)(void *c
         if (t + 2 < c->steps) memcpy(later, b.dstate, n * sizeof *later);
         memcpy(b.dstate, from_behind, n * sizeof *from_behind);
         pull(context, t + 1, b.dstate);
-        decode_back(&b, t, dtop);
+        const net_lanes *x = input(c, d, t, c->frame[last - 1]);
+        decode_back(&b, t, x, dtop);
         recur_back(&b, t, dtop);
-        encode_back(&b, t, input(c, d, t, c->frame[last - 1]));
+        encode_back(&b, t, x);
         if (t && t >= d->given) pass_back(&b, t, t + 2 < c->steps ? later : NULL, from_behind);
         else memset(from_behind, 0, n * sizeof *from_behind);
     }

@@ -5,6 +5,7 @@
 #define VG_NET_CHAIN_H
 
 #include "net/layer_kernel.h"
+#include "net/product_kernel.h"
 #include "net/shape.h"
 
 #define net_chains_make NET(chains_make)
@@ -46,8 +47,8 @@ typedef struct net_chains {
     net_lanes *top;                     /* steps x hidden: h of the last layer */
     net_lanes *frame[2 * VGI_NET_CONVOLUTIONS + 12]; /* numbers each: workspace */
     net_lanes *row;    /* workspace: 16 x max(latent, 4 hidden) */
-    real *pack;        /* workspace of products over several steps */
-    size_t pack_size;
+    real *pack;        /* workspace of products over several steps, aligned for vectors */
+    size_t packed; /* packed: steps in one product of a full layer */
 } net_chains;
 
 int net_chains_make(net_chains *c, const vgi_shape *s, size_t steps, vg_err *e) VG_MUST_CHECK;

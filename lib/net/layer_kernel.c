@@ -57,6 +57,12 @@ static void all_tanh(net_lanes *x, size_t rows)
     for (size_t i = 0; i < rows; i++) x[i] = tangent(x[i]);
 }
 
+static void all_tanh_back(size_t rows, const net_lanes *y, const net_lanes *x, net_lanes *d)
+{
+    const net_lanes one = same(1);
+    for (size_t i = 0; i < rows; i++) d[i] *= one - (y[i] - x[i]) * (y[i] - x[i]);
+}
+
 static void all_gates(size_t n, net_lanes *g, const net_lanes *before, net_lanes *c, net_lanes *h)
 {
     for (size_t k = 0; k < n; k++) {
@@ -241,9 +247,9 @@ static void all_pull(size_t rows, const net_lanes *x, const net_lanes *y, const 
 }
 
 #ifdef VGI_NET_DOUBLE
-const net_layer_kernel vgi_double_layer_kernel = {all_tanh, all_gates, all_gates_back, convolve_any, convolve_back_any,
+const net_layer_kernel vgi_double_layer_kernel = {all_tanh, all_tanh_back, all_gates, all_gates_back, convolve_any, convolve_back_any,
                                                   all_differences, all_pull};
 #else
-const net_layer_kernel VGI_OF_SET(net_layer_kernel) = {all_tanh, all_gates, all_gates_back, convolve_any,
+const net_layer_kernel VGI_OF_SET(net_layer_kernel) = {all_tanh, all_tanh_back, all_gates, all_gates_back, convolve_any,
                                                        convolve_back_any, all_differences, all_pull};
 #endif

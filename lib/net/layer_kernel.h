@@ -8,6 +8,7 @@
 #include "net/real.h"
 
 /* net_tanh: in place. */
+/* net_tanh_back: d *= 1 - (y - x)^2, where y - x is a tanh. */
 /* net_gates: gates (4 n rows: i f g o, before activation) become i f g o; c := f c_before + i g, h := o tanh(c). */
 /* net_gates_back: dh: gradient of h; dc: gradient of c from the following step, becomes that of c_before; dgates:
  * gradients of the gates before activation. */
@@ -38,6 +39,7 @@ typedef struct net_convolution {
 /* The functions above for one instruction set. */
 typedef struct net_layer_kernel {
     void (*tanh)(net_lanes *x, size_t rows);
+    void (*tanh_back)(size_t rows, const net_lanes *y, const net_lanes *x, net_lanes *d);
     void (*gates)(size_t n, net_lanes *gates, const net_lanes *c_before, net_lanes *c, net_lanes *h);
     void (*gates_back)(size_t n, const net_lanes *gates, const net_lanes *c_before, const net_lanes *c,
                        const net_lanes *dh, net_lanes *dc, net_lanes *dgates);
@@ -60,6 +62,7 @@ VGI_KERNEL(net_layer_kernel)
 #endif
 
 #define net_tanh net_kernel()->tanh
+#define net_tanh_back net_kernel()->tanh_back
 #define net_gates net_kernel()->gates
 #define net_gates_back net_kernel()->gates_back
 #define net_convolve net_kernel()->convolve

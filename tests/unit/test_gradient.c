@@ -3,6 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #define VGI_NET_DOUBLE
 #include "net/layer_kernel.c"
+#include "net/product_kernel.c"
 #include "net/chain.c"
 #include "net/loss.c"
 
