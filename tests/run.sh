@@ -12,7 +12,7 @@ CONFIG=${CONFIG:-release}
 TESTS=${TESTS:-all}
 export BUILD CONFIG
 export LC_ALL=C.UTF-8 PYTHONDONTWRITEBYTECODE=1
-unset BASH_ENV ENV CDPATH
+unset BASH_ENV ENV CDPATH MAKEFLAGS MFLAGS # those of the make that runs this are not for the makes under test
 
 work=$(mktemp -d) || exit 4
 trap 'rm -rf "$work"' EXIT
