@@ -339,6 +339,7 @@ void cli_load(vg_head *h, const char *operand, const char *what)
 bool cli_next(vg_source *s, vg_frame *f)
 {
     vg_err e;
+    if (vg_source_may_wait(s)) output_hand_on();
     int r = vg_source_next(s, f, &e);
     if (r < 0) cli_die(&e);
     return r > 0;

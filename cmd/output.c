@@ -226,6 +226,12 @@ void cli_stream_put(const vg_frame *f)
     if (vg_writer_put(out.writer, f, &e) < 0) cli_die(&e);
 }
 
+void output_hand_on(void)
+{
+    vg_err e;
+    if (out.writer && vg_writer_flush(out.writer, &e) < 0) cli_die(&e);
+}
+
 void cli_stream_end(const vg_records *tail)
 {
     vg_err e;

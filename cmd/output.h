@@ -13,6 +13,8 @@ void output_remove(void);
 void output_abandon(const char *program, int status, const char *message);
 /* output_discard: remove output before the process ends by a signal or a library's exit(). Async-signal-safe. */
 void output_discard(void);
+/* output_hand_on: write the frames of a stream that were collected, before waiting for others. Stops if that fails. */
+void output_hand_on(void);
 /* output_flush: flush standard output. Stops if output was lost. */
 void output_flush(void);
 

@@ -462,3 +462,20 @@ END
     must_fail 3 vg-info cut.vgs
     says "'cut.vgs': record PROV: "
 }
+
+# ---- waiting ----------------------------------------------------------------------------------------------------------
+
+@test "frames go on before the next ones are waited for" {
+    printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >a.obj
+    for ((i = 0; i < 80; i++)); do cp a.obj "s$i.obj"; done
+    must vg-encode --no-provenance s*.obj -o all.vgs
+    cut=$(($(wc -c <all.vgs) - 100)) # in the last frame, of 128 bytes; the END mark has 48
+    { head -c $cut all.vgs; for ((n = 0; n < 100; n++)); do [ -e seen ] || sleep 0.1; done; tail -c +$((cut + 1)) all.vgs; } 3>&- |
+        vg-encode --no-provenance - >out.vgs 3>&- &
+    for ((i = 0; i < 80 && $(wc -c <out.vgs) < cut - 76; i++)); do sleep 0.1; done
+    early=$(wc -c <out.vgs)
+    : >seen
+    wait $!
+    [ "$early" = $((cut - 76)) ]
+    same_file out.vgs all.vgs
+}

@@ -119,6 +119,12 @@ int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *
     return VG_OK;
 }
 
+const unsigned char *vgi_input_arrived(const vgi_input *in, size_t *n)
+{
+    *n = in->known || in->ended ? SIZE_MAX : in->size;
+    return in->data;
+}
+
 int vgi_input_ended(vgi_input *in, vg_err *e)
 {
     const unsigned char *data;

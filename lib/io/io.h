@@ -20,6 +20,9 @@ const char *vgi_input_name(const vgi_input *in);
 const char *vgi_input_path(const vgi_input *in); /* path of the file it was opened from, or NULL */
 /* vgi_input_peek: the next bytes without taking them, up to n <= 4096; *got is smaller only at the end of input. */
 int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *got, vg_err *e) VG_MUST_CHECK;
+/* vgi_input_arrived: the bytes that can be had without waiting: *n of them at the address; SIZE_MAX: none has to be
+ * waited for, as in a regular file. */
+const unsigned char *vgi_input_arrived(const vgi_input *in, size_t *n);
 /* vgi_input_ended: 1 at the end of input, 0 before, negative if it cannot be read. */
 int vgi_input_ended(vgi_input *in, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_read: exactly n bytes; VG_ETRUNC if the input ends before. *got (may be NULL): number of bytes read. */

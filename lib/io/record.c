@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <sys/uio.h>
+#include <time.h>
 #include <xxhash.h>
 
 enum { FILE_HEADER = 16, RECORD_HEADER = 32, MINOR = 0, END_PAYLOAD = 16, MOST_PARTS = 3 };
@@ -126,69 +127,145 @@ int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *record, vg_err *e)
     return 1;
 }
 
-/* ---- writing ---- */
-
-int vgi_record_begin_write(int fd, const char *name, vg_err *e)
+bool vgi_record_may_wait(const vgi_input *in)
 {
-    unsigned char h[FILE_HEADER] = {0};
-    memcpy(h, magic, sizeof magic);
-    vgi_put32(h + 8, MINOR);
-    return vgi_write_all(fd, h, sizeof h, name, e);
+    size_t have;
+    const unsigned char *h = vgi_input_arrived(in, &have);
+    if (have == SIZE_MAX) return false;
+    if (have < RECORD_HEADER || memcmp(h, "FRAM", 4)) return true;
+    uint64_t length = vgi_get64(h + 8);
+    return length > have - RECORD_HEADER || have - RECORD_HEADER - length < (-length & 7);
 }
 
-static int write_vector(int fd, const char *name, struct iovec *v, int n, vg_err *e)
+/* ---- writing ---- */
+
+enum {
+    PIECE = 256 * 1024,  /* bytes written at a time; a record of more than a quarter of it is not copied */
+    SLOWLY = 1000 * 1000 /* ns between two records */
+};
+
+static int64_t now(void)
 {
-    while (n > 0) {
-        ssize_t done = writev(fd, v, n);
-        if (done < 0 && errno == EINTR) continue;
-        if (done < 0) return vg_fail(e, VG_ESYS, "cannot write to '%s': %s", name, strerror(errno));
-        while (n > 0 && (size_t)done >= v->iov_len) done -= (ssize_t)v->iov_len, v++, n--;
-        if (n > 0) v->iov_base = (char *)v->iov_base + done, v->iov_len -= (size_t)done;
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+}
+
+/* Append to what waits, which has room. */
+static void hold(vgi_recorder *w, const void *data, size_t n)
+{
+    if (n) memcpy(w->waiting + w->nwaiting, data, n);
+    w->nwaiting += n;
+}
+
+int vgi_recorder_init(vgi_recorder *w, int fd, const char *name, vg_err *e)
+{
+    unsigned char h[FILE_HEADER] = {0};
+    *w = (vgi_recorder){.fd = fd, .name = name};
+    if (!(w->waiting = vgi_array_raw(PIECE, 1, e))) return VG_ENOMEM;
+    int r = vgi_tally_init(&w->tally, e);
+    if (r < 0) {
+        vgi_recorder_clear(w);
+        return r;
     }
+    memcpy(h, magic, sizeof magic);
+    vgi_put32(h + 8, MINOR);
+    hold(w, h, sizeof h);
     return VG_OK;
 }
 
-int vgi_record_write(int fd, const char *name, vgi_tally *t, const char *tag, uint32_t flags, const vgi_part *parts,
-                     size_t nparts, vg_err *e)
+void vgi_recorder_clear(vgi_recorder *w)
+{
+    if (w->tally.sum) vgi_tally_clear(&w->tally);
+    free(w->waiting);
+    *w = (vgi_recorder){.fd = -1};
+}
+
+static int write_vector(vgi_recorder *w, struct iovec *v, int n, vg_err *e)
+{
+    w->failed = true;
+    w->nwaiting = 0;
+    while (n > 0) {
+        ssize_t done = writev(w->fd, v, n);
+        if (done < 0 && errno == EINTR) continue;
+        if (done < 0) return vg_fail(e, VG_ESYS, "cannot write to '%s': %s", w->name, strerror(errno));
+        while (n > 0 && (size_t)done >= v->iov_len) done -= (ssize_t)v->iov_len, v++, n--;
+        if (n > 0) v->iov_base = (char *)v->iov_base + done, v->iov_len -= (size_t)done;
+    }
+    w->failed = false;
+    return VG_OK;
+}
+
+int vgi_recorder_flush(vgi_recorder *w, vg_err *e)
+{
+    return w->nwaiting ? write_vector(w, &(struct iovec){w->waiting, w->nwaiting}, 1, e) : VG_OK;
+}
+
+/* Write or collect the n parts of a record. */
+static int put_parts(vgi_recorder *w, struct iovec *v, int n, vg_err *e)
+{
+    uint64_t size = 0;
+    for (int i = 1; i < n; i++) size += v[i].iov_len;
+    if (size > PIECE / 4) {
+        v[0] = (struct iovec){w->waiting, w->nwaiting};
+        return write_vector(w, v, n, e);
+    }
+    int r = w->nwaiting + size > PIECE ? vgi_recorder_flush(w, e) : VG_OK;
+    if (r < 0) return r;
+    for (int i = 1; i < n; i++) hold(w, v[i].iov_base, v[i].iov_len);
+    int64_t last = w->last;
+    w->last = now();
+    return w->last - last > SLOWLY ? vgi_recorder_flush(w, e) : VG_OK;
+}
+
+static int checksum(const vgi_part *parts, size_t nparts, uint64_t *sum, vg_err *e)
+{
+    if (nparts == 1) {
+        *sum = XXH64(parts[0].data, parts[0].size, 0);
+        return VG_OK;
+    }
+    XXH64_state_t *s = XXH64_createState();
+    if (!s) return vg_fail(e, VG_ENOMEM, "not enough memory for a checksum");
+    XXH64_reset(s, 0);
+    for (size_t i = 0; i < nparts; i++)
+        if (parts[i].size) XXH64_update(s, parts[i].data, parts[i].size);
+    *sum = XXH64_digest(s);
+    XXH64_freeState(s);
+    return VG_OK;
+}
+
+int vgi_record_write(vgi_recorder *w, const char *tag, uint32_t flags, const vgi_part *parts, size_t nparts, vg_err *e)
 {
     static const unsigned char zeros[8];
     unsigned char h[RECORD_HEADER];
-    struct iovec v[MOST_PARTS + 2];
-    int n = 0;
-    uint64_t length = 0, sum;
+    struct iovec v[MOST_PARTS + 3] = {{0}}; /* the first is for what waits */
+    int n = 1;
+    uint64_t length = 0, sum = 0;
     for (size_t i = 0; i < nparts; i++) length += parts[i].size;
     if (length > longest_payload)
         return vg_fail(e, VG_EARG, "a %s record of %llu bytes is too large for a stream", tag,
                        (unsigned long long)length);
-    if (nparts == 1) {
-        sum = XXH64(parts[0].data, parts[0].size, 0);
-    } else {
-        XXH64_state_t *s = XXH64_createState();
-        if (!s) return vg_fail(e, VG_ENOMEM, "not enough memory for a checksum");
-        XXH64_reset(s, 0);
-        for (size_t i = 0; i < nparts; i++)
-            if (parts[i].size) XXH64_update(s, parts[i].data, parts[i].size);
-        sum = XXH64_digest(s);
-        XXH64_freeState(s);
-    }
+    int r = checksum(parts, nparts, &sum, e);
+    if (r < 0) return r;
     memcpy(h, tag, 4);
     vgi_put32(h + 4, flags);
     vgi_put64(h + 8, length);
     vgi_put64(h + 16, sum);
     vgi_put64(h + 24, XXH64(h, 24, 0));
-    tally(t, h);
+    tally(&w->tally, h);
     v[n++] = (struct iovec){h, sizeof h};
     for (size_t i = 0; i < nparts; i++)
         if (parts[i].size) v[n++] = (struct iovec){(void *)parts[i].data, parts[i].size};
     if (length & 7) v[n++] = (struct iovec){(void *)zeros, (size_t)(-length & 7)};
-    return write_vector(fd, name, v, n, e);
+    return put_parts(w, v, n, e);
 }
 
-int vgi_record_end_write(int fd, const char *name, vgi_tally *t, vg_err *e)
+int vgi_record_end_write(vgi_recorder *w, vg_err *e)
 {
     unsigned char payload[END_PAYLOAD];
-    vgi_put64(payload, t->records);
-    vgi_put64(payload + 8, XXH64_digest(t->sum));
+    vgi_put64(payload, w->tally.records);
+    vgi_put64(payload + 8, XXH64_digest(w->tally.sum));
     vgi_part part = {payload, sizeof payload};
-    return vgi_record_write(fd, name, t, "END ", VGI_CRITICAL, &part, 1, e);
+    int r = vgi_record_write(w, "END ", VGI_CRITICAL, &part, 1, e);
+    return r < 0 ? r : vgi_recorder_flush(w, e);
 }

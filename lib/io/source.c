@@ -501,6 +501,15 @@ static int step_source(vg_source *s, vg_frame *f, vg_err *e)
     return r == 0 ? end_reader(s, e) : r;
 }
 
+bool vg_source_may_wait(const vg_source *s)
+{
+    if (s->reader) return vg_reader_may_wait(s->reader);
+    if (s->first) return false;
+    for (size_t i = 0; i < s->items.n; i++)
+        if (!s->items.at[i].regular) return true;
+    return false;
+}
+
 int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
 {
     if (s->through) return vg_reader_next(s->reader, f, e);

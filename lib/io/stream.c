@@ -185,6 +185,11 @@ int vg_reader_next(vg_reader *s, vg_frame *f, vg_err *e)
     return 1;
 }
 
+bool vg_reader_may_wait(const vg_reader *s)
+{
+    return !s->ended && vgi_record_may_wait(s->in);
+}
+
 const vg_failure *vg_reader_failure(const vg_reader *s)
 {
     return s->failure.program ? &s->failure : NULL;
@@ -205,18 +210,17 @@ void vg_reader_close(vg_reader **s)
 /* ---- writer ---- */
 
 struct vg_writer {
-    int fd;
     char *name;
     const vg_head *head;
     vgi_form form;
-    vgi_tally tally;
+    vgi_recorder out;
     vg_bytes front, values; /* reused from record to record */
 };
 
 static int write_record(vg_writer *w, const char *tag, uint32_t flags, const vg_bytes *b, vg_err *e)
 {
     vgi_part part = {b->data, b->size};
-    return vgi_record_write(w->fd, w->name, &w->tally, tag, flags, &part, 1, e);
+    return vgi_record_write(&w->out, tag, flags, &part, 1, e);
 }
 
 static int write_extra(vg_writer *w, const vg_records *list, vg_err *e)
@@ -241,20 +245,21 @@ static int write_artefacts(vg_writer *w, const vgi_artefact *t, vg_err *e)
 
 static int write_head(vg_writer *w, vg_err *e)
 {
-    int r = vgi_record_begin_write(w->fd, w->name, e);
+    int r = VG_OK;
     for (int i = 0; r == VG_OK && i < VGI_ARTEFACTS; i++) r = write_artefacts(w, &vgi_artefacts[i], e);
     if (r == VG_OK) r = write_extra(w, &w->head->extra, e);
     w->front.size = 0;
     if (r == VG_OK) r = vgi_form_encode(&w->front, w->head, e);
-    return r < 0 ? r : write_record(w, "FORM", VGI_CRITICAL, &w->front, e);
+    if (r == VG_OK) r = write_record(w, "FORM", VGI_CRITICAL, &w->front, e);
+    return r < 0 ? r : vgi_recorder_flush(&w->out, e);
 }
 
 int vg_writer_open(vg_writer **out, int fd, const char *name, const vg_head *h, vg_err *e)
 {
     vg_writer *w = *out = vgi_array(1, sizeof *w, e);
     if (!w) return VG_ENOMEM;
-    w->fd = fd, w->head = h, w->form = vgi_form_of(h);
-    int r = (w->name = vgi_copy_string(name, strlen(name), e)) ? vgi_tally_init(&w->tally, e) : VG_ENOMEM;
+    w->head = h, w->form = vgi_form_of(h);
+    int r = (w->name = vgi_copy_string(name, strlen(name), e)) ? vgi_recorder_init(&w->out, fd, w->name, e) : VG_ENOMEM;
     if (r == VG_OK) r = write_head(w, e);
     if (r < 0) vg_writer_close(out);
     return r;
@@ -273,26 +278,33 @@ int vg_writer_put(vg_writer *w, const vg_frame *f, vg_err *e)
     if (r == VG_OK) r = vgi_values_encode(&w->values, f->values, n, h->precision, &parts[1].data, &parts[1].size, e);
     if (r < 0) return r;
     parts[0] = (vgi_part){w->front.data, w->front.size};
-    return vgi_record_write(w->fd, w->name, &w->tally, "FRAM", VGI_CRITICAL, parts, 2, e);
+    return vgi_record_write(&w->out, "FRAM", VGI_CRITICAL, parts, 2, e);
+}
+
+int vg_writer_flush(vg_writer *w, vg_err *e)
+{
+    return vgi_recorder_flush(&w->out, e);
 }
 
 int vg_writer_end(vg_writer *w, const vg_records *tail, vg_err *e)
 {
     int r = tail ? write_extra(w, tail, e) : VG_OK;
-    return r < 0 ? r : vgi_record_end_write(w->fd, w->name, &w->tally, e);
+    return r < 0 ? r : vgi_record_end_write(&w->out, e);
 }
 
 void vg_writer_abandon(vg_writer *w, const char *program, int exit_status, const char *message)
 {
     w->front.size = 0;
-    if (vgi_fail_encode(&w->front, program, exit_status, message, NULL) == VG_OK)
-        if (write_record(w, "FAIL", VGI_CRITICAL, &w->front, NULL) < 0) return; /* nothing more can be reported */
+    if (w->out.failed || vgi_fail_encode(&w->front, program, exit_status, message, NULL) < 0) return;
+    if (write_record(w, "FAIL", VGI_CRITICAL, &w->front, NULL) == VG_OK && vgi_recorder_flush(&w->out, NULL) == VG_OK)
+        return;
+    /* nothing more can be reported */
 }
 
 void vg_writer_close(vg_writer **w)
 {
     if (!*w) return;
-    vgi_tally_clear(&(*w)->tally);
+    vgi_recorder_clear(&(*w)->out);
     vg_bytes_clear(&(*w)->front);
     vg_bytes_clear(&(*w)->values);
     free((*w)->name);

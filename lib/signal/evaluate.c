@@ -1,7 +1,7 @@
 /* evaluate.c: evaluates a signal at any time: curve, surface, shapes.
  *
- * Shapes are products of a batch of coordinates with the basis. The batch always has the same size, so that a shape
- * does not depend on the others in it. Signals are fitted in fit.c.
+ * Shapes are products of a batch of coordinates with the basis, a stripe of it at a time, which stays in the cache. The
+ * batch always has the same size, so that a shape does not depend on the others in it. Signals are fitted in fit.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/curve.h"
@@ -11,6 +11,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+enum { STRIPE = 512 }; /* numbers of a shape */
+
 struct vg_sampler {
     const vg_signal *s;
     vgi_plate plate;
@@ -19,7 +21,7 @@ struct vg_sampler {
     double *functions;    /* l */
     double *turn_second, *shift_second; /* of the root */
     bool single;
-    double *basis, *x, *shape;             /* m x d, batch x m, batch x d */
+    double *basis, *x, *shape;             /* m x d, batch x m, batch x stripe */
     float *basis_single, *x_single, *shape_single;
     bool borrowed;                         /* the basis is borrowed from the signal */
 };
@@ -73,8 +75,8 @@ void vgi_signal_vector(const vg_signal *s, size_t j, double *h)
 static int take_basis(vg_sampler *p, vg_err *e)
 {
     const vg_signal *s = p->s;
-    size_t size, batch;
-    if (!vgi_mul(s->m, s->d, &size) || !vgi_mul(s->d, VG_SAMPLER_BATCH, &batch))
+    size_t size, room = (size_t)VG_SAMPLER_BATCH * STRIPE;
+    if (!vgi_mul(s->m, s->d, &size))
         return vg_fail(e, VG_ENOMEM, "a basis of %zu x %zu numbers is too large", s->m, s->d);
     if (!p->single && s->bits == 64 && s->m) p->basis = s->basis, p->borrowed = true;
     else if (p->single && s->bits == 32 && s->m) p->basis_single = s->basis_single, p->borrowed = true;
@@ -92,9 +94,9 @@ static int take_basis(vg_sampler *p, vg_err *e)
     free(row);
     if (p->single)
         return (p->x_single = vgi_array(VG_SAMPLER_BATCH, (s->m + 1) * sizeof(float), e)) &&
-               (p->shape_single = vgi_array_raw(batch, sizeof(float), e)) ? VG_OK : VG_ENOMEM;
+               (p->shape_single = vgi_array_raw(room, sizeof(float), e)) ? VG_OK : VG_ENOMEM;
     return (p->x = vgi_array(VG_SAMPLER_BATCH, (s->m + 1) * sizeof(double), e)) &&
-           (p->shape = vgi_array_raw(batch, sizeof(double), e)) ? VG_OK : VG_ENOMEM;
+           (p->shape = vgi_array_raw(room, sizeof(double), e)) ? VG_OK : VG_ENOMEM;
 }
 
 static int take_root(vg_sampler *p, vg_err *e)
@@ -168,13 +170,15 @@ void vg_sampler_coordinates(vg_sampler *p, const double at[2], double *x)
     if (m) vgi_product_double(1, m, p->plate.l, p->functions, p->plate.l, p->coefficients, m, x, m);
 }
 
-static void shapes_single(vg_sampler *p, size_t n, const double *x, double *const *shapes)
+/* `width` numbers of n shapes, from the first on: the mean and what differs from it. */
+static void finish_stripe(const vg_sampler *p, size_t n, size_t first, size_t width, double *const *shapes)
 {
-    size_t m = p->s->m, d = p->s->d;
-    for (size_t i = 0; i < n * m; i++) p->x_single[i] = (float)x[i];
-    vgi_product_single(VG_SAMPLER_BATCH, d, m, p->x_single, m, p->basis_single, d, p->shape_single, d);
-    for (size_t i = 0; i < n; i++)
-        for (size_t c = 0; c < d; c++) shapes[i][c] = p->s->mean[c] + (double)p->shape_single[i * d + c];
+    const double *mean = p->s->mean + first;
+    for (size_t i = 0; i < n; i++) {
+        double *to = shapes[i] + first;
+        for (size_t c = 0; c < width && p->single; c++) to[c] = mean[c] + (double)p->shape_single[i * width + c];
+        for (size_t c = 0; c < width && !p->single; c++) to[c] = mean[c] + p->shape[i * width + c];
+    }
 }
 
 void vg_sampler_shapes(vg_sampler *p, size_t n, const double *x, double *const *shapes)
@@ -184,14 +188,15 @@ void vg_sampler_shapes(vg_sampler *p, size_t n, const double *x, double *const *
         for (size_t i = 0; i < n; i++) memcpy(shapes[i], p->s->mean, d * sizeof(double));
         return;
     }
-    if (p->single) {
-        shapes_single(p, n, x, shapes);
-        return;
+    if (p->single) for (size_t i = 0; i < n * m; i++) p->x_single[i] = (float)x[i];
+    else memcpy(p->x, x, n * m * sizeof *x);
+    for (size_t first = 0; first < d; first += STRIPE) {
+        size_t width = d - first < STRIPE ? d - first : STRIPE;
+        if (p->single)
+            vgi_product_single(VG_SAMPLER_BATCH, width, m, p->x_single, m, p->basis_single + first, d, p->shape_single, width);
+        else vgi_product_double(VG_SAMPLER_BATCH, width, m, p->x, m, p->basis + first, d, p->shape, width);
+        finish_stripe(p, n, first, width, shapes);
     }
-    memcpy(p->x, x, n * m * sizeof *x);
-    vgi_product_double(VG_SAMPLER_BATCH, d, m, p->x, m, p->basis, d, p->shape, d);
-    for (size_t i = 0; i < n; i++)
-        for (size_t c = 0; c < d; c++) shapes[i][c] = p->s->mean[c] + p->shape[i * d + c];
 }
 
 bool vg_sampler_root(const vg_sampler *p, double time, double turn[4], double shift[3])

@@ -27,6 +27,8 @@ typedef struct vg_failure {
 
 /* vg_reader_next: 1 and the next frame; 0 after the END mark, if nothing follows it; negative on damage. */
 int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+/* vg_reader_may_wait: whether vg_reader_next may have to wait for its input. */
+bool vg_reader_may_wait(const vg_reader *r);
 vg_records *vg_reader_tail(vg_reader *r); /* unknown records after the last frame; valid once vg_reader_next has
                                              returned 0 */
 /* vg_reader_failure: the reason for VG_ETRUNC, if the stream gives one; else NULL. Borrowed until close. */
@@ -36,7 +38,12 @@ void vg_reader_close(vg_reader **r);
 typedef struct vg_writer vg_writer;
 /* vg_writer_open: write everything up to FORM. fd is borrowed. h is borrowed until close and must not change. */
 int vg_writer_open(vg_writer **w, int fd, const char *name, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+/* vg_writer_put: small frames are collected and written together, up to 256 KiB; but frames that come more than a
+ * millisecond apart are written as they come. */
 int vg_writer_put(vg_writer *w, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+/* vg_writer_flush: write what was collected. Before waiting for anything (vg_reader_may_wait), so that the reader of the
+ * stream need not wait too. */
+int vg_writer_flush(vg_writer *w, vg_err *e) VG_MUST_CHECK;
 /* vg_writer_end: write remaining unknown records (may be NULL) and END, and flush. A stream without END is
  * incomplete. */
 int vg_writer_end(vg_writer *w, const vg_records *tail, vg_err *e) VG_MUST_CHECK;
@@ -84,6 +91,7 @@ int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, co
 const char *vg_source_warning(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);
 int vg_source_next(vg_source *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+bool vg_source_may_wait(const vg_source *s); /* as vg_reader_may_wait */
 vg_records *vg_source_tail(vg_source *s);
 const vg_failure *vg_source_failure(const vg_source *s); /* as vg_reader_failure */
 void vg_source_close(vg_source **s);

@@ -166,7 +166,7 @@ int vg_signal_sketch(const double *points, size_t n, bool controls, size_t frame
 
 /* Evaluates a signal. */
 typedef struct vg_sampler vg_sampler;
-enum { VG_SAMPLER_BATCH = 32 };
+enum { VG_SAMPLER_BATCH = 64 };
 /* vg_sampler_new: s is borrowed until free. single: numbers of binary32 precision are enough. VG_EINPUT when the
  * signal's sites say less than its coordinates need. */
 int vg_sampler_new(vg_sampler **p, const vg_signal *s, bool single, vg_err *e) VG_MUST_CHECK;

@@ -13,6 +13,7 @@
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -1143,6 +1144,43 @@ static void test_full_device(void)
     content_clear(&c);
 }
 
+/* ---- frames that are collected ---- */
+
+static int64_t bytes_of(int fd)
+{
+    return (int64_t)lseek(fd, 0, SEEK_END);
+}
+
+static void test_collected(void)
+{
+    content c = make(VG_VERTICES, VG_F64, PLAIN);
+    int fd = memfd_create("stream", 0), held = 0;
+    vg_writer *w = NULL;
+    vg_err e = {0, ""};
+    CHECK(vg_writer_open(&w, fd, "out", &c.head, &e) == VG_OK);
+    int64_t head = bytes_of(fd), frame = 0;
+    CHECK(head > 0); /* whoever reads can begin */
+    for (int i = 0; i < 100; i++) { /* one that comes late, which is written as it comes, and one right after it */
+        nanosleep(&(struct timespec){.tv_nsec = 1500000}, NULL);
+        int64_t before = bytes_of(fd);
+        CHECK(vg_writer_put(w, &c.frame[0], &e) == VG_OK);
+        int64_t late = bytes_of(fd);
+        if (!frame) frame = late - before;
+        CHECK(frame > 0 && late == before + frame);
+        CHECK(vg_writer_put(w, &c.frame[0], &e) == VG_OK);
+        held += bytes_of(fd) == late;
+        CHECK(vg_writer_flush(w, &e) == VG_OK && bytes_of(fd) == late + frame);
+    }
+    CHECK(held > 0);
+    CHECK(vg_writer_flush(w, &e) == VG_OK && bytes_of(fd) == head + 200 * frame);
+    for (int i = 0; i < 10; i++) CHECK(vg_writer_put(w, &c.frame[0], &e) == VG_OK);
+    vg_writer_abandon(w, "vg-solve", 3, "the matrix is gone"); /* after the frames */
+    CHECK(bytes_of(fd) > head + 210 * frame);
+    vg_writer_close(&w);
+    close(fd);
+    content_clear(&c);
+}
+
 TESTS({"every kind there and back", test_there_and_back}, {"extreme numbers", test_numbers},
       {"every prefix and every changed byte is refused", test_damage},
       {"nothing may follow the end", test_behind_the_end}, {"the END mark counts", test_end_mark},
@@ -1150,4 +1188,5 @@ TESTS({"every kind there and back", test_there_and_back}, {"extreme numbers", te
       {"the reader takes finite numbers only", test_not_finite_in}, {"the writer, too", test_not_finite_out},
       {"lengths that lie cost no memory", test_lying_lengths}, {"counts that lie", test_lying_counts},
       {"from a descriptor in pieces", test_descriptor}, {"many megabytes", test_large},
-      {"counts out of range", test_count_ranges}, {"a failure is passed on", test_abandon}, {"a full device", test_full_device})
+      {"counts out of range", test_count_ranges}, {"a failure is passed on", test_abandon}, {"a full device", test_full_device},
+      {"frames that are collected", test_collected})
