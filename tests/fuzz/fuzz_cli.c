@@ -119,7 +119,7 @@ static int split(char *input, size_t size, char *words[MOST_WORDS + 2])
 
 static void reset(void)
 {
-    memset(&cli, 0, sizeof cli);
+    memset(&state, 0, sizeof state);
     memset(&out, 0, sizeof out);
     out.fd = -1;
     want_help = want_version = flag = false;
@@ -132,7 +132,7 @@ static void reset(void)
 
 static void check_parsed(const cli_program *p, size_t n, char **operands)
 {
-    demand(n <= p->most_operands && cli.threads >= 1 && isfinite(number));
+    demand(n <= p->most_operands && cli_threads() >= 1 && isfinite(number));
     size_t reads = text && !strcmp(text, "-");
     for (size_t i = 0; i < n; i++) demand(operands[i] != NULL), reads += !strcmp(operands[i], "-");
     demand(reads <= 1 && !(cli_given("count") && cli_given("any")));
