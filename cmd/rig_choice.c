@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FOLDS = 3, MOST_CANDIDATES = 6, SMOOTHINGS = 2 };
+enum { FOLDS = 3, RIDGES = 3, MOST_CANDIDATES = 2 * RIDGES, SMOOTHINGS = 2 };
 static const size_t large = 1000000; /* vertices times bones: beyond it one number of bones per corner is tried */
 
 typedef struct candidate {
@@ -24,9 +24,8 @@ typedef struct choosing {
     size_t fold, folds, fitted; /* blocks; poses that are not held out */
     size_t *rank;               /* of each of these poses among them */
     vg_rig_fitter *fitter;
-    vg_player *players[2];      /* skinning, envelope */
-    double *out[2][FITTING_BATCH];
-    candidate at[MOST_CANDIDATES], *now;
+    size_t nridges;
+    candidate at[MOST_CANDIDATES], *now; /* those of the same bones per corner follow one another, one for each ridge */
     size_t n;
 } choosing;
 
@@ -52,55 +51,46 @@ static bool is_left_out(void *context, size_t i)
     return !fitting_is_held_out(x->f, i) && is_in_fold(x, i);
 }
 
+static void take_transforms(const choosing *x, const fitting_batch *b, const double **transforms)
+{
+    for (size_t i = 0; i < b->n; i++) transforms[i] = x->transforms[b->index[i]];
+}
+
 static void add_batch(void *context, const fitting_batch *b)
 {
     choosing *x = context;
     const double *transforms[FITTING_BATCH];
-    for (size_t i = 0; i < b->n; i++) transforms[i] = x->transforms[b->index[i]];
+    take_transforms(x, b, transforms);
     vg_rig_fitter_add(x->fitter, b->n, b->values, transforms);
 }
 
 static void judge_batch(void *context, const fitting_batch *b)
 {
     choosing *x = context;
-    double *transforms[FITTING_BATCH];
-    size_t nv = x->f->h->body.mesh.nv;
-    for (size_t i = 0; i < b->n; i++) transforms[i] = x->transforms[b->index[i]];
-    for (int way = 0; way < 2; way++)
-        vg_player_pose(x->players[way], b->n, (const double *const *)transforms, x->out[way]);
-    for (size_t i = 0; i < b->n; i++)
-        for (size_t k = 0; k < 3 * nv; k++) {
-            double s = x->out[0][i][k] - b->values[i][k], d = x->out[1][i][k] - x->out[0][i][k];
-            double *sums = x->now->sums + 2 * (k / 3);
-            sums[0] += s * d, sums[1] += d * d;
-        }
+    vg_err e;
+    const double *transforms[FITTING_BATCH];
+    double *sums[RIDGES];
+    take_transforms(x, b, transforms);
+    for (size_t i = 0; i < x->nridges; i++) sums[i] = x->now[i].sums;
+    if (vg_rig_fitter_judge(x->fitter, b->n, b->values, transforms, sums, &e) < 0) cli_die(&e);
 }
 
 /* All candidates on one fold. */
 static void try_fold(choosing *x, const vg_rig_options *o)
 {
     vg_err e;
-    const vg_head *h = x->f->h;
-    vg_rig rig;
-    vg_map skinning, envelope;
-    if (vg_rig_fitter_new(&x->fitter, h, o, &e) < 0) cli_die(&e);
+    vg_rig_options trial = *o;
+    trial.trial = true;
+    if (vg_rig_fitter_new(&x->fitter, x->f->h, &trial, &e) < 0) cli_die(&e);
     fitting_pass(x->f, is_fitted, add_batch, x);
-    if (vg_rig_fitter_finish(x->fitter, VG_RIG_LBS, &rig, &skinning, &e) < 0) cli_die(&e);
-    vg_head_put(x->f->h, &rig, "rig");
-    for (size_t c = 0; c < x->n; c++) {
+    for (size_t c = 0; c < x->n; c += x->nridges) {
+        double ridge[RIDGES];
         x->now = &x->at[c];
-        vg_rig_fitter_choose(x->fitter, x->now->bones_per_corner, x->now->refine);
-        if (vg_rig_fitter_finish(x->fitter, VG_RIG_ENVELOPE, &rig, &envelope, &e) < 0 ||
-            vg_player_new(&x->players[0], &h->body, &skinning, false, cli_threads(), &e) < 0 ||
-            vg_player_new(&x->players[1], &h->body, &envelope, false, cli_threads(), &e) < 0)
-            cli_die(&e);
+        for (size_t i = 0; i < x->nridges; i++) ridge[i] = x->now[i].refine;
+        vg_rig_fitter_choose(x->fitter, x->now->bones_per_corner, o->refine);
+        if (vg_rig_fitter_try(x->fitter, x->nridges, ridge, &e) < 0) cli_die(&e);
         fitting_pass(x->f, is_left_out, judge_batch, x);
-        vg_player_free(&x->players[0]);
-        vg_player_free(&x->players[1]);
-        vg_map_clear(&envelope);
-        vg_rig_clear(&rig);
     }
-    vg_map_clear(&skinning);
     vg_rig_fitter_free(&x->fitter);
 }
 
@@ -155,11 +145,12 @@ static void choose_best(const choosing *x, rig_choice *choice)
 
 static void list_candidates(choosing *x, const vg_rig_options *o, bool corners_given, bool refine_given)
 {
-    static const double strengths[] = {0.003, 0.03, 0.3};
+    static const double strengths[RIDGES] = {0.003, 0.03, 0.3};
     const vg_head *h = x->f->h;
     size_t least = corners_given || h->body.mesh.nv * h->body.rig.nbones > large ? o->bones_per_corner : 1;
+    x->nridges = refine_given ? 1 : RIDGES;
     for (size_t corners = o->bones_per_corner + 1; corners-- > least;)
-        for (size_t i = 0; i < (refine_given ? 1 : 3); i++)
+        for (size_t i = 0; i < x->nridges; i++)
             x->at[x->n++] = (candidate){corners, refine_given ? o->refine : strengths[i],
                                         choice_array(2 * h->body.mesh.nv, sizeof(double))};
 }
@@ -168,13 +159,10 @@ void rig_choose(const fitting *f, double *const *transforms, const vg_rig_option
                 bool refine_given, rig_choice *choice)
 {
     choosing x = {.f = f, .transforms = transforms};
-    size_t nv = f->h->body.mesh.nv;
     x.rank = choice_array(f->n, sizeof *x.rank);
     for (size_t i = 0; i < f->n; i++)
         if (!fitting_is_held_out(f, i)) x.rank[i] = x.fitted++;
     x.folds = x.fitted < FOLDS ? x.fitted : FOLDS;
-    for (int way = 0; way < 2; way++)
-        for (size_t i = 0; i < FITTING_BATCH; i++) x.out[way][i] = choice_array(3 * nv, sizeof(double));
     list_candidates(&x, o, corners_given, refine_given);
     for (x.fold = 0; x.fold < x.folds && x.folds > 1; x.fold++) {
         cli_progress_of("folds", x.fold, x.folds);
@@ -182,7 +170,5 @@ void rig_choose(const fitting *f, double *const *transforms, const vg_rig_option
     }
     choose_best(&x, choice);
     for (size_t c = 0; c < x.n; c++) free(x.at[c].sums);
-    for (int way = 0; way < 2; way++)
-        for (size_t i = 0; i < FITTING_BATCH; i++) free(x.out[way][i]);
     free(x.rank);
 }

@@ -15,8 +15,7 @@ typedef struct rig_choice {
 
 /* rig_choose: divide the fitted poses of f into blocks and leave each block out of a fit once, by skinning and by envelopes
  * with several ridges and numbers of bones per corner; choose those of least error in the blocks left out.
- * transforms: of all poses. A refine or bones_per_corner that the user gave is kept. The weights of the head's rig are those
- * of the last fit afterwards. */
+ * transforms: of all poses. A refine or bones_per_corner that the user gave is kept. */
 void rig_choose(const fitting *f, double *const *transforms, const vg_rig_options *o, bool corners_given,
                 bool refine_given, rig_choice *choice);
 

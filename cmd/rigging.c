@@ -282,7 +282,7 @@ static void measure_transforms(work *w, const fitting_batch *b)
     free(turns);
 }
 
-static void add_again(void *context, const fitting_batch *b)
+static void add_fitted(void *context, const fitting_batch *b)
 {
     work *w = context;
     const double *poses[FITTING_BATCH], *transforms[FITTING_BATCH];
@@ -300,7 +300,7 @@ static void fit_batch(void *context, const fitting_batch *b)
     for (size_t i = 0; i < b->n; i++)
         w->transforms[b->index[i]] = rig_array(7 * w->h->body.rig.nbones, sizeof(double));
     measure_transforms(w, b);
-    add_again(w, b);
+    add_fitted(w, b);
     cli_progress_of("poses fitted", b->index[b->n - 1] + 1, w->poses.n);
 }
 
@@ -395,11 +395,8 @@ static void fit_rig(work *w)
     fitting_pass(&w->poses, NULL, fit_batch, w);
     finish_map(w, VG_RIG_LBS);
     if (by_choice(w->o)) {
-        vg_rig_fitter_free(&rig_fitter);
         rig_choose(&w->poses, w->transforms, &o, w->o->bones_per_corner > 0, w->o->refine >= 0, &w->choice);
-        o.bones_per_corner = w->choice.bones_per_corner, o.refine = w->choice.refine;
-        if (vg_rig_fitter_new(&rig_fitter, h, &o, &e) < 0) cli_die(&e);
-        fitting_pass(&w->poses, NULL, add_again, w);
+        vg_rig_fitter_choose(rig_fitter, w->choice.bones_per_corner, w->choice.refine);
     }
     if (!by_skinning(w->o)) finish_map(w, VG_RIG_ENVELOPE);
     if (by_choice(w->o)) mix_rows(&w->maps[VG_RIG_ENVELOPE], &w->maps[VG_RIG_LBS], w->choice.share);

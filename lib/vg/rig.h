@@ -105,6 +105,7 @@ typedef struct vg_rig_options {
     double refine;           /* ridge of the regression by which the bones near a vertex take up what that leaves of the
                                 poses: the larger, the less of it; 0: they take up nothing */
     int threads;
+    bool trial;              /* only vg_rig_fitter_try is wanted, no map: less memory and time */
 } vg_rig_options;
 
 /* vg_rig_fitter_new: h: mesh, reference, links (vg_head_prepare_vectors) and a rig, whose weights do not matter; borrowed
@@ -119,6 +120,13 @@ void vg_rig_fitter_choose(vg_rig_fitter *f, size_t bones_per_corner, double refi
 /* vg_rig_fitter_finish: the rig with its weights, and the map of its bones; both are empty on failure. May be called
  * again for another method. VG_EINPUT without poses. */
 int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_rig *rig, vg_map *map, vg_err *e) VG_MUST_CHECK;
+/* vg_rig_fitter_try: fit skinning and, for each of n ridges, the envelope, for vg_rig_fitter_judge. VG_EINPUT without
+ * poses. */
+int vg_rig_fitter_try(vg_rig_fitter *f, size_t n, const double *ridge, vg_err *e) VG_MUST_CHECK;
+/* vg_rig_fitter_judge: compare both with n poses. Where skinning misses vertex v by s, and the envelope of ridge i by
+ * s + d, s.d is added to sums[i][2 v] and d.d to sums[i][2 v + 1]. */
+int vg_rig_fitter_judge(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms,
+                        double *const *sums, vg_err *e) VG_MUST_CHECK;
 
 #ifdef __cplusplus
 }

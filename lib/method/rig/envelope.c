@@ -1,10 +1,11 @@
 /* envelope.c: fits a map of bones to poses (MATH 6; T 5): bone and offset of each corner, held vertices, and the
- * linear operator they collapse into. Sums over poses are in rig_sums.c, weights in skin.c, unknown motions in
- * inverse_skin.c.
+ * linear operator they collapse into. Sums over poses are in rig_sums.c, weights in skin.c, the regression of what is
+ * left in refine.c, unknown motions in inverse_skin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "numeric/lapack.h"
 #include "method/rig/map_parts.h"
+#include "method/rig/refine.h"
 #include "method/rig/skin.h"
 #include "model/rig.h"
 #include "numeric/stats.h"
@@ -12,7 +13,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { CHUNK = 64, MOST_HELD = 2048, NEAR = 32, AROUND = 8 };
+enum { CHUNK = 64, MOST_HELD = 2048, NEAR = 32 };
 
 struct vg_rig_fitter {
     const vg_head *h;
@@ -24,6 +25,7 @@ struct vg_rig_fitter {
     double *miss; /* nv: error of linear blend skinning per vertex */
     bool skinned; /* the skin was fitted to all poses added so far */
     vg_map base;  /* the envelope before refinement, for o.bones_per_corner; n == 0: not computed yet */
+    vgi_trials trials; /* of vg_rig_fitter_try */
 };
 
 int vg_rig_fitter_new(vg_rig_fitter **out, const vg_head *h, const vg_rig_options *o, vg_err *e)
@@ -42,7 +44,7 @@ int vg_rig_fitter_new(vg_rig_fitter **out, const vg_head *h, const vg_rig_option
         memcpy(at + 3 * b, h->body.rig.at + 3 * (size_t)h->body.rig.bone[b], 3 * sizeof *at);
     if (r == VG_OK) r = vg_head_graph(&f->g, h, e);
     if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->faces.nf, f->g->faces.start, f->g->faces.vert, h->body.reference, e);
-    if (r == VG_OK) r = vgi_rig_sums_make(&f->sums, h->body.mesh.nv, h->body.rig.nbones, at, &f->turns, e);
+    if (r == VG_OK) r = vgi_rig_sums_make(&f->sums, h->body.mesh.nv, h->body.rig.nbones, at, o->trial ? NULL : &f->turns, e);
     if (r == VG_OK && !(f->miss = vgi_array(h->body.mesh.nv, sizeof *f->miss, e))) r = VG_ENOMEM;
     free(at);
     if (r < 0) vg_rig_fitter_free(out);
@@ -59,6 +61,7 @@ void vg_rig_fitter_free(vg_rig_fitter **out)
     vgi_rig_sums_clear(&f->sums);
     free(f->miss);
     vg_map_clear(&f->base);
+    vgi_trials_clear(&f->trials);
     free(f);
     *out = NULL;
 }
@@ -103,10 +106,14 @@ static double weight_of(const vgi_rig_sums *s, size_t j)
     return s->cross[4 * j * 4 * s->n + 4 * j];
 }
 
-/* Rotation of a face relative to bone j. */
+/* Rotation of a face relative to bone j; in a trial any will do, since only vectors count. */
 static void face_turn(const vgi_rig_sums *s, size_t face, size_t j, double q[4])
 {
     double m[9], h[9];
+    if (!s->turn) {
+        memcpy(q, (const double[4]){1, 0, 0, 0}, 4 * sizeof *q);
+        return;
+    }
     for (size_t i = 0; i < 3; i++)
         for (size_t k = 0; k < 3; k++) m[3 * i + k] = s->turn[(3 * face + k) * 3 * s->n + 3 * j + i];
     vgi_fit_rotation(m, h);
@@ -325,125 +332,6 @@ static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     return r;
 }
 
-/* The residual of the envelope. */
-
-typedef struct refining {
-    const vg_rig_fitter *f;
-    vg_map *m;
-    double origin[3]; /* of the reference pose */
-    uint32_t *parent; /* of each bone */
-    size_t chunks;
-    double *space; /* per chunk: 4 n */
-} refining;
-
-/* Element (i, k) x (j, l) of the sums of T_i' T_j, with the reference pose among the poses. */
-static double cross_with_reference(const refining *x, size_t i, size_t k, size_t j, size_t l)
-{
-    const vgi_rig_sums *s = &x->f->sums;
-    const double *a = s->at + 3 * i, *b = s->at + 3 * j, *o = x->origin;
-    double sum = s->cross[(4 * i + k) * 4 * s->n + 4 * j + l];
-    if (k < 3 && l < 3) return sum + (k == l);
-    if (k < 3) return sum + b[k] - o[k];
-    if (l < 3) return sum + a[l] - o[l];
-    return sum + (a[0] - o[0]) * (b[0] - o[0]) + (a[1] - o[1]) * (b[1] - o[1]) + (a[2] - o[2]) * (b[2] - o[2]);
-}
-
-/* Residual of vertex v, minus the contribution of row z (relative to the joints), along component k of bone i. */
-static double residual_along(const refining *x, size_t v, const double *z, size_t i, size_t k)
-{
-    const vgi_rig_sums *s = &x->f->sums;
-    const double *p = x->f->h->body.reference + 3 * v, *a = s->at + 3 * i, *o = x->origin;
-    double sum = s->pull[v * 4 * s->n + 4 * i + k];
-    if (k < 3) sum += p[k] - o[k];
-    else sum += (p[0] - o[0]) * (a[0] - o[0]) + (p[1] - o[1]) * (a[1] - o[1]) + (p[2] - o[2]) * (a[2] - o[2]);
-    for (size_t j = 0; j < s->n; j++)
-        for (size_t l = 0; l < 4; l++)
-            if (z[4 * j + l] != 0) sum -= cross_with_reference(x, i, k, j, l) * z[4 * j + l];
-    return sum;
-}
-
-/* Bones of the vertex, then the neighbours of the first two in the skeleton. */
-static size_t bones_around(const refining *x, size_t v, uint32_t *list)
-{
-    const vg_rig *r = &x->f->rig;
-    size_t n = 0, own;
-    while (n < VG_SKIN && r->skin_weight[VG_SKIN * v + n] > 0) list[n] = r->skin_bone[VG_SKIN * v + n], n++;
-    own = n < 2 ? n : 2;
-    for (size_t i = 0; i < own; i++)
-        for (size_t b = 0; b < r->nbones && n < AROUND; b++) {
-            if (x->parent[b] != list[i] && x->parent[list[i]] != b) continue;
-            bool there = false;
-            for (size_t k = 0; k < n; k++) there |= list[k] == b;
-            if (!there) list[n++] = (uint32_t)b;
-        }
-    return n;
-}
-
-/* Ridge regression on the motions of the vertex's bones. Only differences of translations enter, so that rigid motion
- * of the whole body is preserved. */
-static void refine_vertex(const refining *x, size_t v, double *z)
-{
-    enum { MOST = 4 * AROUND };
-    size_t n = x->m->n, bones = 0, unknowns = 0, bone[MOST], number[MOST];
-    double *row = x->m->weights + v * 4 * n, s[MOST * MOST], y[MOST], d[AROUND][4] = {{0}};
-    uint32_t own[AROUND];
-    for (size_t j = 0; j < n; j++) {
-        for (size_t k = 0; k < 3; k++) z[4 * j + k] = row[4 * j + k] - row[4 * j + 3] * x->f->sums.at[3 * j + k];
-        z[4 * j + 3] = row[4 * j + 3];
-    }
-    bones = bones_around(x, v, own);
-    for (size_t b = 0; b < bones; b++)
-        for (size_t k = 0; k < 4; k++)
-            if (b || k < 3) bone[unknowns] = b, number[unknowns++] = k;
-    double base = residual_along(x, v, z, own[0], 3);
-    for (size_t i = 0; i < unknowns; i++) {
-        size_t a = own[bone[i]], k = number[i];
-        y[i] = residual_along(x, v, z, a, k) - (k == 3 ? base : 0);
-        for (size_t j = 0; j <= i; j++) {
-            size_t c = own[bone[j]], l = number[j];
-            double sum = cross_with_reference(x, a, k, c, l);
-            if (k == 3) sum -= cross_with_reference(x, own[0], 3, c, l);
-            if (l == 3) sum -= cross_with_reference(x, a, k, own[0], 3);
-            if (k == 3 && l == 3) sum += cross_with_reference(x, own[0], 3, own[0], 3);
-            s[i * unknowns + j] = sum;
-        }
-    }
-    for (size_t i = 0; i < unknowns; i++) s[i * unknowns + i] *= 1 + x->f->o.refine;
-    if (!vgi_spd_factor(unknowns, s)) return;
-    vgi_spd_solve(unknowns, s, 1, y);
-    for (size_t i = 0; i < unknowns; i++) {
-        d[bone[i]][number[i]] += y[i];
-        if (number[i] == 3) d[0][3] -= y[i];
-    }
-    for (size_t b = 0; b < bones; b++) {
-        double *to = row + 4 * (size_t)own[b];
-        for (size_t k = 0; k < 3; k++) to[k] += d[b][k] + d[b][3] * x->f->sums.at[3 * (size_t)own[b] + k];
-        to[3] += d[b][3];
-    }
-}
-
-static void refine_chunk(void *context, size_t task)
-{
-    const refining *x = context;
-    size_t nv = x->m->nv, first = task * nv / x->chunks, last = (task + 1) * nv / x->chunks;
-    for (size_t v = first; v < last; v++)
-        if (x->f->g->in_face[v]) refine_vertex(x, v, x->space + task * 4 * x->m->n);
-}
-
-static int refine_envelope(const vg_rig_fitter *f, vg_map *m, vg_err *e)
-{
-    refining x = {.f = f, .m = m, .chunks = m->nv < CHUNK ? 1 : CHUNK};
-    if (!(f->o.refine > 0)) return VG_OK;
-    x.space = vgi_array(x.chunks, 4 * m->n * sizeof *x.space, e);
-    x.parent = vgi_array(m->n, sizeof *x.parent, e);
-    int r = x.space && x.parent ? vgi_rig_parents(&f->rig, x.parent, e) : VG_ENOMEM;
-    vg_centroid(f->h->body.reference, m->nv, x.origin);
-    if (r == VG_OK) vgi_parallel(f->o.threads, x.chunks, refine_chunk, &x);
-    free(x.space);
-    free(x.parent);
-    return r;
-}
-
 /* ---- the map ---- */
 
 static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *e)
@@ -469,33 +357,63 @@ static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *
     return vgi_place_by_bones(r, m, m->place, e);
 }
 
-/* The envelope before refinement. */
-static int make_base(vg_rig_fitter *f, vg_map *m, vg_err *e)
+/* The envelope before refinement, into f->base. */
+static int make_base(vg_rig_fitter *f, vg_err *e)
 {
     const vgi_map_body body = {f->h->body.reference, &f->rig};
-    int r = make_arrays(f, m, true, e);
-    if (r == VG_OK) r = fit_corners(f, m, e);
-    if (r == VG_OK) r = choose_held(f, m, e);
-    if (r == VG_OK) r = vgi_map_collapse(m, &body, f->g, NULL, f->turns.vector, f->o.threads, e);
-    return r < 0 ? r : vg_map_copy(&f->base, m, e);
+    int r = make_arrays(f, &f->base, true, e);
+    if (r == VG_OK) r = fit_corners(f, &f->base, e);
+    if (r == VG_OK) r = choose_held(f, &f->base, e);
+    if (r == VG_OK) r = vgi_map_collapse(&f->base, &body, f->g, NULL, f->turns.vector, f->o.threads, e);
+    if (r < 0) vg_map_clear(&f->base);
+    return r;
+}
+
+static int fit_skin(vg_rig_fitter *f, vg_err *e)
+{
+    if (!f->sums.poses) return vg_fail(e, VG_EINPUT, "there are no poses but the reference to fit a rig to");
+    int r = f->skinned ? VG_OK : vgi_skin_fit(&f->rig, &f->sums, f->h->body.reference, f->o.threads, f->miss, e);
+    f->skinned = r == VG_OK;
+    return r;
+}
+
+static vgi_envelope envelope_of(const vg_rig_fitter *f)
+{
+    return (vgi_envelope){&f->sums, &f->rig, f->h->body.reference, f->g->in_face, &f->base, f->o.threads};
 }
 
 int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_rig *rig, vg_map *m, vg_err *e)
 {
     const vgi_map_body body = {f->h->body.reference, &f->rig};
-    int r = VG_OK;
     *rig = (vg_rig){0}, *m = (vg_map){0};
-    if (!f->sums.poses) return vg_fail(e, VG_EINPUT, "there are no poses but the reference to fit a rig to");
-    if (!f->skinned) r = vgi_skin_fit(&f->rig, &f->sums, body.reference, f->o.threads, f->miss, e);
-    f->skinned = r == VG_OK;
+    int r = f->o.trial ? vg_fail(e, VG_EARG, "a trial has no map") : fit_skin(f, e);
     if (r == VG_OK && method == VG_RIG_LBS) {
         r = make_arrays(f, m, false, e);
         for (size_t v = 0; r == VG_OK && v < m->nv; v++) vgi_map_skin_row(m, &body, v);
     } else if (r == VG_OK) {
-        r = f->base.n ? vg_map_copy(m, &f->base, e) : make_base(f, m, e);
-        if (r == VG_OK) r = refine_envelope(f, m, e);
+        vgi_envelope x = envelope_of(f);
+        if (!f->base.n) r = make_base(f, e);
+        if (r == VG_OK) r = vg_map_copy(m, &f->base, e);
+        if (r == VG_OK) r = vgi_refine(&x, f->o.refine, m, e);
     }
     if (r == VG_OK) r = vg_rig_copy(rig, &f->rig, f->g->faces.nv, e);
     if (r < 0) vg_map_clear(m);
     return r;
+}
+
+int vg_rig_fitter_try(vg_rig_fitter *f, size_t n, const double *ridge, vg_err *e)
+{
+    vgi_envelope x = envelope_of(f);
+    int r = fit_skin(f, e);
+    if (r == VG_OK && !f->base.n) r = make_base(f, e);
+    vgi_trials_clear(&f->trials);
+    return r < 0 ? r : vgi_trials_make(&f->trials, &x, n, ridge, e);
+}
+
+int vg_rig_fitter_judge(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms,
+                        double *const *sums, vg_err *e)
+{
+    vgi_envelope x = envelope_of(f);
+    if (!f->trials.n) return vg_fail(e, VG_EARG, "there is nothing to judge: call vg_rig_fitter_try first");
+    return vgi_trials_judge(&f->trials, &x, n, poses, transforms, sums, e);
 }

@@ -1,7 +1,6 @@
 /* rig_sums.c: the sums over poses to which weights and corners of a rig are fitted, one matrix product per block of
  * poses. skin.c and envelope.c use them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "numeric/face.h"
 #include "method/rig/rig_sums.h"
 #include "numeric/blas.h"
 
@@ -25,8 +24,7 @@ int vgi_rig_sums_make(vgi_rig_sums *s, size_t nv, size_t n, const double *at, co
     bool ok = s->at && s->cross && s->pull && s->square && s->motions && s->turned && s->transposed && s->origin;
     if (ok && turns) {
         s->turn = vgi_array(3 * turns->nf, 3 * n * sizeof *s->turn, e);
-        s->length = vgi_array(turns->start[turns->nf], sizeof *s->length, e);
-        ok = s->turn && s->length;
+        ok = s->turn != NULL;
     }
     if (ok) return VG_OK;
     vgi_rig_sums_clear(s);
@@ -40,7 +38,6 @@ void vgi_rig_sums_clear(vgi_rig_sums *s)
     free(s->pull);
     free(s->square);
     free(s->turn);
-    free(s->length);
     free(s->motions);
     free(s->turned);
     free(s->transposed);
@@ -89,22 +86,6 @@ static void add_vertices(void *context, size_t task)
     vgi_product_add(rows, 4 * s->n, width, y, width, s->motions, 4 * s->n, s->pull + first * 4 * s->n, 4 * s->n);
 }
 
-/* Add the squared vectors of a face's corners. */
-static void add_lengths(const adding *a, size_t face)
-{
-    const vgi_turns *t = a->s->turns;
-    uint32_t begin = t->start[face], end = t->start[face + 1];
-    for (size_t k = 0; k < a->count; k++) {
-        double centre[3];
-        vgi_face_centre(a->poses[k], t->vert + begin, end - begin, centre);
-        for (uint32_t c = begin; c < end; c++)
-            for (size_t i = 0; i < 3; i++) {
-                double d = a->poses[k][3 * (size_t)t->vert[c] + i] - centre[i];
-                a->s->length[c] += d * d;
-            }
-    }
-}
-
 static void add_faces(void *context, size_t task)
 {
     const adding *a = context;
@@ -113,7 +94,6 @@ static void add_faces(void *context, size_t task)
            width = 3 * a->count;
     double f[3 * FACES * 3 * BLOCK];
     for (size_t i = 0; i < faces; i++) {
-        add_lengths(a, first + i);
         for (size_t k = 0; k < a->count; k += VGI_LANES) {
             const double *poses[VGI_LANES];
             vgi_lanes turn[9];

@@ -19,7 +19,6 @@ typedef struct vgi_rig_sums {
     double *square;         /* nv: sum of |y|^2 */
     const vgi_turns *turns; /* NULL, or the reference for rotations of faces: */
     double *turn;           /* (3 per face) x 3 n: sum of F' A_j, F the rotation of the face */
-    double *length;         /* per corner: sum of the squared vector */
     /* workspace */
     double *motions, *turned, *transposed, (*origin)[3];
 } vgi_rig_sums;
