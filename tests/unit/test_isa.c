@@ -8,6 +8,7 @@
 #include "method/patches/segment_kernel.h"
 #include "method/rig/map_kernel.h"
 #include "method/rig/play_kernel.h"
+#include "method/rig/rig_kernel.h"
 #include "method/vectors/deform_kernel.h"
 #include "method/vectors/guess.h"
 #include "method/vectors/planar_kernel.h"
@@ -715,6 +716,27 @@ static void products_are_spread(void)
     under_each(check_spread);
 }
 
+/* Four rows by one vector, of every length. */
+static void check_dots(void)
+{
+    enum { MOST = 37 };
+    double rows[4 * MOST], x[MOST], y[4];
+    for (size_t n = 0; n <= MOST; n++) {
+        for (size_t i = 0; i < 4 * n; i++) rows[i] = wave(i), x[i / 4] = wave(500 + i);
+        vgi_rig_kernel_now()->dots(rows, x, n, y);
+        for (size_t k = 0; k < 4; k++) {
+            double sum = 0;
+            for (size_t i = 0; i < n; i++) sum += rows[k * n + i] * x[i];
+            CHECK_NEAR(y[k], sum, 1e-14 * MOST);
+        }
+    }
+}
+
+static void rows_are_multiplied(void)
+{
+    under_each(check_dots);
+}
+
 TESTS({"choose by name", choose_by_name}, {"numbers are scanned", numbers_are_scanned},
       {"factors are solved", factors_are_solved}, {"rows come and go", rows_come_and_go},
       {"vectors are deformed", vectors_are_deformed}, {"poses are guessed", poses_are_guessed},
@@ -722,5 +744,5 @@ TESTS({"choose by name", choose_by_name}, {"numbers are scanned", numbers_are_sc
       {"planes are sought", planes_are_sought}, {"faces are measured", faces_are_measured},
       {"features are summed", features_are_summed},
       {"sums of maps", sums_of_maps},
-      {"products are spread", products_are_spread}, {"signals are fitted", signals_are_fitted},
+      {"products are spread", products_are_spread}, {"rows are multiplied", rows_are_multiplied}, {"signals are fitted", signals_are_fitted},
       {"layers are passed", layers_are_passed}, {"fronts are eliminated", fronts_are_eliminated})

@@ -110,7 +110,7 @@ static void fit_with(stage *x, vg_rig_method method, const vg_rig_options *o)
 
 static void fit(stage *x, vg_rig_method method, size_t bones, double refine, int threads)
 {
-    const vg_rig_options o = {bones, 0.03, refine, threads};
+    const vg_rig_options o = {bones, 0.03, refine, threads, false};
     fit_with(x, method, &o);
 }
 
@@ -502,7 +502,7 @@ static void near_bones(void)
 static void every_component_is_held(void)
 {
     stage x;
-    const vg_rig_options o = {1, 0, 0, 1};
+    const vg_rig_options o = {1, 0, 0, 1, false};
     set_stage(&x, make_beads(), 40);
     size_t each = x.h.body.mesh.nv / BONES, held[BONES] = {0};
     paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0);
@@ -900,6 +900,83 @@ static void threads_do_not_matter(void)
     free(first);
 }
 
+/* The sums of a trial with the ridges 0, 0.003 and 0.3, fitted to all but the last poses, judged on these. */
+static void try_ridges(const stage *x, size_t bones, const double *ridge, size_t left, double *const *sums)
+{
+    vg_err e;
+    vg_rig_fitter *f;
+    size_t fitted = POSES - left;
+    const vg_rig_options trial = {bones, 0.03, 1, 2, true};
+    CHECK(vg_rig_fitter_new(&f, &x->h, &trial, &e) == VG_OK);
+    vg_rig_fitter_add(f, fitted, (const double *const *)x->poses, (const double *const *)x->transforms);
+    CHECK(vg_rig_fitter_try(f, 3, ridge, &e) == VG_OK);
+    CHECK(vg_rig_fitter_judge(f, left, (const double *const *)x->poses + fitted,
+                              (const double *const *)x->transforms + fitted, sums, &e) == VG_OK);
+    vg_rig_fitter_free(&f);
+}
+
+/* The same from maps that are played. */
+static void check_trial(stage *x, size_t bones, double ridge, size_t left, const double *sums)
+{
+    vg_err e;
+    size_t nv = x->h.body.mesh.nv, fitted = POSES - left;
+    double *out[2], *mine = room(2 * nv, sizeof *mine), scale = 0;
+    vg_player *p[2];
+    vg_map map[2];
+    vg_rig rig;
+    vg_rig_fitter *f;
+    const vg_rig_options o = {bones, 0.03, ridge, 1, false};
+    CHECK(vg_rig_fitter_new(&f, &x->h, &o, &e) == VG_OK);
+    vg_rig_fitter_add(f, fitted, (const double *const *)x->poses, (const double *const *)x->transforms);
+    for (int way = 0; way < 2; way++) {
+        CHECK(vg_rig_fitter_finish(f, way ? VG_RIG_ENVELOPE : VG_RIG_LBS, &rig, &map[way], &e) == VG_OK);
+        vg_head_put(&x->h, &rig, "rig");
+        CHECK(vg_player_new(&p[way], &x->h.body, &map[way], false, 1, &e) == VG_OK);
+        out[way] = room(3 * nv, sizeof(double));
+    }
+    for (size_t k = fitted; k < POSES; k++) {
+        for (int way = 0; way < 2; way++) vg_player_pose(p[way], 1, (const double *const *)x->transforms + k, &out[way]);
+        for (size_t i = 0; i < 3 * nv; i++) {
+            double s = out[0][i] - x->poses[k][i], d = out[1][i] - out[0][i];
+            mine[i / 3 * 2] += s * d, mine[i / 3 * 2 + 1] += d * d;
+        }
+    }
+    for (size_t i = 0; i < 2 * nv; i++) scale = fmax(scale, fabs(mine[i]));
+    CHECK(scale > 0);
+    for (size_t i = 0; i < 2 * nv; i++) CHECK_NEAR(sums[i], mine[i], 1e-9 * scale);
+    for (int way = 0; way < 2; way++) {
+        vg_player_free(&p[way]);
+        vg_map_clear(&map[way]);
+        free(out[way]);
+    }
+    vg_rig_fitter_free(&f);
+    free(mine);
+}
+
+/* What a trial says of poses left out is what the maps do that are fitted without them. */
+static void trials_are_maps(void)
+{
+    static const double ridge[3] = {0, 0.003, 0.3};
+    for (size_t bones = 1; bones <= 2; bones++) {
+        stage x;
+        vg_err e;
+        double *sums[3];
+        set_stage(&x, make_limb(), 40);
+        paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.4);
+        skin_poses(&x);
+        for (size_t k = 0; k < POSES; k++)
+            for (size_t i = 0; i < 3 * x.h.body.mesh.nv; i++) x.poses[k][i] += 0.02 * noise();
+        CHECK(vg_head_prepare_vectors(&x.h, &e) == VG_OK);
+        for (size_t i = 0; i < 3; i++) sums[i] = room(2 * x.h.body.mesh.nv, sizeof(double));
+        try_ridges(&x, bones, ridge, 3, sums);
+        for (size_t i = 0; i < 3; i++) {
+            check_trial(&x, bones, ridge[i], 3, sums[i]);
+            free(sums[i]);
+        }
+        strike(&x);
+    }
+}
+
 static void what_cannot_be_fitted_is_refused(void)
 {
     stage x;
@@ -908,7 +985,7 @@ static void what_cannot_be_fitted_is_refused(void)
     vg_rig rig;
     vg_map map;
     set_stage(&x, make_limb(), 40);
-    const vg_rig_options three = {3, 0.03, 0, 1}, one = {1, 0.03, 0, 1};
+    const vg_rig_options three = {3, 0.03, 0, 1, false}, one = {1, 0.03, 0, 1, false}, trial = {1, 0.03, 0, 1, true};
     CHECK(vg_rig_fitter_new(&f, &x.h, &three, &e) == VG_EARG);
     CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_EARG && strstr(e.message, "links"));
     CHECK(vg_head_prepare_vectors(&x.h, &e) == VG_OK);
@@ -916,6 +993,12 @@ static void what_cannot_be_fitted_is_refused(void)
     const double *poses[1] = {x.h.body.reference}, *transforms[1] = {x.transforms[0]};
     vg_rig_fitter_add(f, 1, poses, transforms); /* the reference says nothing */
     CHECK(vg_rig_fitter_finish(f, VG_RIG_ENVELOPE, &rig, &map, &e) == VG_EINPUT && !map.n && strstr(e.message, "no poses"));
+    CHECK(vg_rig_fitter_try(f, 1, &one.refine, &e) == VG_EINPUT);
+    CHECK(vg_rig_fitter_judge(f, 1, poses, transforms, NULL, &e) == VG_EARG);
+    vg_rig_fitter_free(&f);
+    CHECK(vg_rig_fitter_new(&f, &x.h, &trial, &e) == VG_OK);
+    vg_rig_fitter_add(f, 1, (const double *const *)x.poses, transforms);
+    CHECK(vg_rig_fitter_finish(f, VG_RIG_LBS, &rig, &map, &e) == VG_EARG && strstr(e.message, "trial"));
     vg_rig_fitter_free(&f);
     vg_rig_clear(&x.h.body.rig);
     CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_EINPUT);
@@ -945,5 +1028,5 @@ TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again"
       {"a rig serves another body", a_rig_serves_another_body},
       {"joints go with their own", joints_go_with_their_own},
       {"joints of vertices find themselves", joints_of_vertices_find_themselves},
-      {"threads do not matter", threads_do_not_matter},
+      {"threads do not matter", threads_do_not_matter}, {"trials are maps", trials_are_maps},
       {"what cannot be fitted is refused", what_cannot_be_fitted_is_refused})

@@ -22,6 +22,8 @@ struct vg_free_bones {
     uint32_t *bone;   /* VG_SKIN per vertex */
     double *local;    /* 4 per bone of a vertex: its weight times (p - at, 1) */
     double *g;        /* 4 n x 4 n */
+    size_t *first;    /* n + 1: the bones that share vertices with bone j are near[first[j]] .. near[first[j + 1] - 1] */
+    uint32_t *near;
     double *own;      /* 16 n: per bone the sum of weight (p - at, 1) (p - at, 1)' */
     double *space;    /* BLOCK times the workspace */
 };
@@ -57,6 +59,24 @@ static void make_quadratic(vg_free_bones *x, const double *weight)
         }
 }
 
+/* The blocks of G that are not zero, row by row. */
+static int find_near(vg_free_bones *x, vg_err *e)
+{
+    size_t n = x->n, count = 0, width = 4 * n;
+    bool *shared = vgi_array(n, n * sizeof *shared, e);
+    if (!shared) return VG_ENOMEM;
+    for (size_t j = 0; j < n; j++)
+        for (size_t i = 0; i < n; i++) count += shared[j * n + i] = x->g[(4 * j + 3) * width + 4 * i + 3] > 0;
+    if ((x->near = vgi_array(count, sizeof *x->near, e)))
+        for (size_t j = 0; j < n; j++) {
+            x->first[j + 1] = x->first[j];
+            for (size_t i = 0; i < n; i++)
+                if (shared[j * n + i]) x->near[x->first[j + 1]++] = (uint32_t)i;
+        }
+    free(shared);
+    return x->near ? VG_OK : VG_ENOMEM;
+}
+
 int vg_free_bones_new(vg_free_bones **out, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e)
 {
     *out = NULL;
@@ -69,8 +89,8 @@ int vg_free_bones_new(vg_free_bones **out, const vg_rig *r, size_t nv, const dou
     x->bone = vgi_copy_array(r->skin_bone, VG_SKIN * nv, sizeof *x->bone, e);
     x->local = vgi_array(VG_SKIN * nv, 4 * sizeof *x->local, e);
     x->g = vgi_array(4 * n, 4 * n * sizeof *x->g, e), x->own = vgi_array(16 * n, sizeof *x->own, e);
-    x->space = vgi_array(BLOCK, 36 * n * sizeof *x->space, e);
-    if (!x->at || !x->bone || !x->local || !x->g || !x->own || !x->space) {
+    x->space = vgi_array(BLOCK, 36 * n * sizeof *x->space, e), x->first = vgi_array(n + 1, sizeof *x->first, e);
+    if (!x->at || !x->first || !x->bone || !x->local || !x->g || !x->own || !x->space) {
         vg_free_bones_free(out);
         return VG_ENOMEM;
     }
@@ -81,7 +101,9 @@ int vg_free_bones_new(vg_free_bones **out, const vg_rig *r, size_t nv, const dou
         x->local[4 * s + 3] = w;
     }
     make_quadratic(x, r->skin_weight);
-    return VG_OK;
+    int done = find_near(x, e);
+    if (done < 0) vg_free_bones_free(out);
+    return done;
 }
 
 void vg_free_bones_free(vg_free_bones **out)
@@ -93,6 +115,8 @@ void vg_free_bones_free(vg_free_bones **out)
     free(x->local);
     free(x->g);
     free(x->own);
+    free(x->first);
+    free(x->near);
     free(x->space);
     free(x);
     *out = NULL;
@@ -141,15 +165,29 @@ static void start_alone(const vg_free_bones *x, working *w)
     }
 }
 
+/* B - T G loses d (3 x 4) in the columns of bone j. */
+static void deduct(const vg_free_bones *x, working *w, size_t j, const double d[12])
+{
+    size_t width = 4 * x->n;
+    for (size_t q = x->first[j]; q < x->first[j + 1]; q++) {
+        const double *g = x->g + 4 * j * width + 4 * (size_t)x->near[q];
+        double *left = w->left + 4 * (size_t)x->near[q];
+        for (size_t c = 0; c < 3; c++, left += width)
+            for (size_t k = 0; k < 4; k++)
+                left[k] -= d[4 * c] * g[k] + d[4 * c + 1] * g[width + k] + d[4 * c + 2] * g[2 * width + k] +
+                           d[4 * c + 3] * g[3 * width + k];
+    }
+}
+
 static void find_left(const vg_free_bones *x, working *w)
 {
     size_t width = 4 * x->n;
     memcpy(w->left, w->b, 3 * width * sizeof *w->left);
-    for (size_t c = 0; c < 3; c++)
-        for (size_t i = 0; i < width; i++) {
-            double t = w->t[c * width + i];
-            for (size_t k = 0; k < width; k++) w->left[c * width + k] -= t * x->g[i * width + k];
-        }
+    for (size_t j = 0; j < x->n; j++) {
+        double t[12];
+        for (size_t i = 0; i < 12; i++) t[i] = w->t[i / 4 * width + 4 * j + i % 4];
+        deduct(x, w, j, t);
+    }
 }
 
 /* Fit bone j with the other bones fixed. Returns the largest change of its rotation. */
@@ -157,7 +195,7 @@ static double improve_bone(const vg_free_bones *x, working *w, size_t j)
 {
     size_t width = 4 * x->n;
     const double *g = x->g + 4 * j * width + 4 * j;
-    double m[12], old[12], *t = w->t + 4 * j, most = 0;
+    double m[12], d[12], old[12], *t = w->t + 4 * j, most = 0;
     for (size_t i = 0; i < 12; i++) old[i] = t[i / 4 * width + i % 4];
     for (size_t c = 0; c < 3; c++)
         for (size_t k = 0; k < 4; k++) {
@@ -167,12 +205,10 @@ static double improve_bone(const vg_free_bones *x, working *w, size_t j)
     place_bone(g, width, m, t, width);
     for (size_t c = 0; c < 3; c++)
         for (size_t i = 0; i < 4; i++) {
-            double d = t[c * width + i] - old[4 * c + i];
-            if (i < 3 && fabs(d) > most) most = fabs(d);
-            if (d == 0) continue;
-            const double *row = x->g + (4 * j + i) * width;
-            for (size_t k = 0; k < width; k++) w->left[c * width + k] -= d * row[k];
+            d[4 * c + i] = t[c * width + i] - old[4 * c + i];
+            if (i < 3) most = fmax(most, fabs(d[4 * c + i]));
         }
+    deduct(x, w, j, d);
     return most;
 }
 

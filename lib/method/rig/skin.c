@@ -121,13 +121,37 @@ typedef struct choice {
     double w[VG_SKIN], value;
 } choice;
 
-/* Solve a x = b for n <= 3, by elimination with the largest pivot. Unknowns without a pivot stay 0. */
+/* Solve a x = b for a positive definite a, n <= 3. Returns false, and changes nothing, if a is nearly singular. */
+static bool solve_definite(double a[3][3], double *b, size_t n, double scale)
+{
+    static const double least = 1e-11;
+    double l[3] = {0}, d[3] = {1, 1, 1};
+    for (size_t i = 0; i < n; i++) {
+        double pivot = a[i][i];
+        if (i > 0) l[i - 1] = a[i][0] / d[0], pivot -= l[i - 1] * a[i][0];
+        if (i > 1) {
+            double below = a[2][1] - l[0] * a[2][0];
+            l[2] = below / d[1], pivot -= l[2] * below;
+        }
+        if (!(pivot > least * scale)) return false;
+        d[i] = pivot;
+    }
+    if (n > 1) b[1] -= l[0] * b[0];
+    if (n > 2) b[2] -= l[1] * b[0] + l[2] * b[1], b[2] /= d[2];
+    if (n > 1) b[1] = b[1] / d[1] - (n > 2 ? l[2] * b[2] : 0);
+    if (n > 0) b[0] = b[0] / d[0] - (n > 1 ? l[0] * b[1] : 0) - (n > 2 ? l[1] * b[2] : 0);
+    return true;
+}
+
+/* Solve a x = b for n <= 3; if a is nearly singular, by elimination with the largest pivot. Unknowns without a pivot stay
+ * 0. */
 static void solve_small(double a[3][3], double *b, size_t n)
 {
     bool used[3] = {false, false, false};
     size_t row_of[3];
     double scale = 0;
     for (size_t i = 0; i < n; i++) scale = fmax(scale, fabs(a[i][i]));
+    if (solve_definite(a, b, n, scale)) return;
     for (size_t c = 0; c < n; c++) {
         size_t p = n;
         for (size_t i = 0; i < n; i++)
@@ -152,22 +176,23 @@ static void solve_small(double a[3][3], double *b, size_t n)
 }
 
 /* Compute the weights of the chosen bones, removing one by one those that would be negative, and the value of the
- * quadratic. */
+ * quadratic, but for its ridge. */
 static void weigh_bones(const quadratic *q, choice *c)
 {
     for (;;) {
         size_t n = c->n - 1, base = c->at[n];
-        double a[3][3], w[VG_SKIN], sum = 0;
+        double a[3][3], w[VG_SKIN], right[VG_SKIN], sum = 0;
         for (size_t i = 0; i < n; i++) {
             size_t k = c->at[i];
-            w[i] = q->b[k] - q->b[base] - q->g[k][base] + q->g[base][base];
+            w[i] = right[i] = q->b[k] - q->b[base] - q->g[k][base] + q->g[base][base];
             for (size_t j = 0; j < n; j++) {
                 size_t l = c->at[j];
                 a[i][j] = q->g[k][l] - q->g[k][base] - q->g[base][l] + q->g[base][base] + (i == j ? q->ridge : 0);
             }
         }
         solve_small(a, w, n);
-        for (size_t i = 0; i < n; i++) sum += w[i];
+        c->value = q->g[base][base] - 2 * q->b[base];
+        for (size_t i = 0; i < n; i++) sum += w[i], c->value -= w[i] * right[i];
         w[n] = 1 - sum;
         size_t worst = 0;
         for (size_t i = 1; i <= n; i++)
@@ -179,11 +204,6 @@ static void weigh_bones(const quadratic *q, choice *c)
         memmove(c->at + worst, c->at + worst + 1, (n - worst) * sizeof *c->at);
         c->n--;
     }
-    c->value = 0;
-    for (size_t i = 0; i < c->n; i++) {
-        c->value -= 2 * c->w[i] * q->b[c->at[i]];
-        for (size_t j = 0; j < c->n; j++) c->value += c->w[i] * c->w[j] * q->g[c->at[i]][c->at[j]];
-    }
 }
 
 static bool has_bone(const choice *c, size_t k)
@@ -191,6 +211,32 @@ static bool has_bone(const choice *c, size_t k)
     for (size_t i = 0; i < c->n; i++)
         if (c->at[i] == k) return true;
     return false;
+}
+
+/* At most how much each bone can lower the quadratic, added to the chosen ones or in place of one. The quadratic is convex,
+ * and at its minimum over the chosen bones its derivatives by their weights are alike: the derivative by another weight, at
+ * most 1, relative to theirs, bounds what is gained. */
+static void bound_gains(const quadratic *q, const choice *c, double *gain)
+{
+    double slope[MOST], level = 0;
+    for (size_t k = 0; k < q->n; k++) {
+        slope[k] = -2 * q->b[k];
+        for (size_t i = 0; i < c->n; i++) slope[k] += 2 * c->w[i] * q->g[k][c->at[i]];
+    }
+    for (size_t i = 0; i < c->n; i++) level += c->w[i] * slope[c->at[i]];
+    for (size_t k = 0; k < q->n; k++) gain[k] = has_bone(c, k) ? 0 : level - slope[k];
+}
+
+/* Add bone k to the best choice, or try it in place of each bone if there are four. */
+static void try_bone(const quadratic *q, const choice *best, size_t k, choice *next)
+{
+    bool full = best->n == VG_SKIN;
+    for (size_t out = 0; out < (full ? VG_SKIN : 1); out++) {
+        choice c = *best;
+        c.at[full ? out : c.n++] = k;
+        weigh_bones(q, &c);
+        if (c.value < next->value) *next = c;
+    }
 }
 
 static void choose_bones(const quadratic *q, double least_gain, choice *best)
@@ -201,15 +247,15 @@ static void choose_bones(const quadratic *q, double least_gain, choice *best)
     weigh_bones(q, best);
     for (int round = 0; round < 2 * VG_SKIN; round++) { /* add or replace a bone */
         choice next = *best;
-        for (size_t k = 0; k < q->n; k++) {
-            if (has_bone(best, k)) continue;
-            for (size_t out = best->n < VG_SKIN ? VG_SKIN : 0; out < (best->n < VG_SKIN ? VG_SKIN + 1 : best->n);
-                 out++) {
-                choice c = *best;
-                c.at[out < VG_SKIN ? out : c.n++] = k;
-                weigh_bones(q, &c);
-                if (c.value < next.value) next = c;
-            }
+        double gain[MOST];
+        bound_gains(q, best, gain);
+        for (;;) {
+            size_t k = 0;
+            for (size_t i = 1; i < q->n; i++)
+                if (gain[i] > gain[k]) k = i;
+            if (!(gain[k] > least_gain && gain[k] > best->value - next.value)) break;
+            try_bone(q, best, k, &next);
+            gain[k] = 0;
         }
         if (!(next.value < best->value - least_gain)) break;
         *best = next;
