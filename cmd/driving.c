@@ -70,6 +70,18 @@ static void note_aligned(const vg_driver *d, const vg_skeleton *s, const char *m
     if (n) cli_warn("the skeleton of the input rests in another pose than '%s': aligned %s; --align none leaves them", map, list);
 }
 
+static void note_stance(const vg_driver *d, const char *map)
+{
+    static const char *const axes[] = {"x", "y", "z"};
+    bool faces;
+    int up = vg_driver_stands(d, &faces);
+    if (up)
+        cli_warn("the skeleton of the input rests with %s%s up, unlike '%s': its motion is turned upright%s; --align none leaves it",
+                 up < 0 ? "-" : "", axes[(up < 0 ? -up : up) - 1], map, faces ? ", and it faces another way" : "");
+    else if (faces)
+        cli_warn("the skeleton of the input rests facing another way than '%s', which is made up for; --align none leaves it", map);
+}
+
 /* ---- --joints ---- */
 
 static uint32_t take_joint(lines *l, const vg_skeleton *s, const char *whose)
@@ -114,6 +126,7 @@ void driving_start(driving *d, const driving_options *o, const vg_rig *rig, cons
     if (missing)
         cli_warn("%zu of %zu bones have no matching joint of the skeleton: they follow their parents",
                  missing, rig->nbones);
+    note_stance(d->driver, name);
     note_aligned(d->driver, &rig->skeleton, name);
     free(chosen);
     free(partner);

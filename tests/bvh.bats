@@ -304,3 +304,86 @@ for f, g in zip(a.frames, b.frames):
         assert cosine > 0.99, (f.name, bone, cosine)
 END
 }
+
+# captured FILE: thirty joints as CMU names them, legs apart and arms out at rest, in twelve large poses
+captured() {
+    py "$1" <<'END'
+import math, sys
+tree = [("Hips", None, (0, 0, 0))]
+for s, x in (("Left", 1), ("Right", -1)):
+    tree += [(s[0] + "HipJoint", "Hips", (0, 0, 0)), (s + "UpLeg", s[0] + "HipJoint", (1.4 * x, -1.8, 0.8)), (s + "Leg", s + "UpLeg", (2.4 * x, -6.7, 0)),
+             (s + "Foot", s + "Leg", (2.6 * x, -7.0, 0)), (s + "ToeBase", s + "Foot", (0.2 * x, -0.4, 2.3))]
+tree += [("LowerBack", "Hips", (0, 0, 0)), ("Spine", "LowerBack", (0, 2.0, -0.2)), ("Spine1", "Spine", (0, 2.0, 0)), ("Neck", "Spine1", (0, 0, 0)),
+         ("Neck1", "Neck", (0, 1.5, 0.1)), ("Head", "Neck1", (0, 1.7, -0.4))]
+for s, x in (("Left", 1), ("Right", -1)):
+    tree += [(s + "Shoulder", "Spine1", (0, 0, 0)), (s + "Arm", s + "Shoulder", (3.5 * x, 1.2, -0.4)), (s + "ForeArm", s + "Arm", (5.0 * x, 0, 0)),
+             (s + "Hand", s + "ForeArm", (3.4 * x, 0, 0))]
+out = ["HIERARCHY"]
+def put(i, depth):
+    n, up, o = tree[i]
+    pad = "  " * depth
+    below = [k for k in range(len(tree)) if tree[k][1] == n]
+    out.extend([pad + ("JOINT " if depth else "ROOT ") + n, pad + "{", pad + "  OFFSET %g %g %g" % o,
+                pad + "  CHANNELS " + ("3 " if depth else "6 Xposition Yposition Zposition ") + "Zrotation Xrotation Yrotation"])
+    for k in below: put(k, depth + 1)
+    if not below: out.append(pad + "  End Site { OFFSET 0 1 0 }".replace(" { ", "\n" + pad + "  {\n" + pad + "    ").replace(" }", "\n" + pad + "  }"))
+    out.append(pad + "}")
+put(0, 0)
+out += ["MOTION", "Frames: 12", "Frame Time: 0.04"]
+for f in range(12):
+    row = [math.sin(f) * 3, 17 + math.cos(f), f * 1.5]
+    for i in range(len(tree)):
+        # a clavicle, a joint of the hip and the root of the spine hardly turn
+        size = 3 if tree[i][0] in ("LHipJoint", "RHipJoint", "LeftShoulder", "RightShoulder", "LowerBack") else 20 if i else 40
+        row += [size * math.sin(1.3 * f + 2.1 * i + c) for c in range(3)]
+    out.append(" ".join("%.6f" % x for x in row))
+open(sys.argv[1], "w").write("\n".join(out) + "\n")
+END
+}
+
+@test "conventions: Mixamo, Unreal, MakeHuman, Rigify, CMU, Daz, VRM: names, order, rest pose, units, up axis, more joints and fewer" {
+    captured cmu.bvh
+    for style in mixamo unreal unreal-y makehuman rigify metarig asf few vrm; do
+        py <<END
+import sys
+sys.path.insert(0, "$ROOT/tests")
+import conventions
+conventions.convert("cmu.bvh", "$style", "$style.bvh", 1)
+END
+        must vg-encode $style.bvh -o $style.vgs
+        # there and back: onto the skeleton that the motion comes from
+        capture vg-deform --onto cmu.bvh $style.bvh -o vectors.vgs
+        [ "$status" = 0 ] || fail "$style: $stderr"
+        case $style in unreal | rigify) says 'rests with z up, unlike' 'turned upright' ;; *) [[ $stderr != *upright* ]] ;; esac
+        must vg-solve vectors.vgs -o $style-back.vgs
+    done
+    must vg-encode cmu.bvh -o cmu.vgs
+    py <<'END'
+import math, read_stream
+truth = read_stream.read_stream("cmu.vgs")
+def limbs(s, f):
+    at = {x.name: i for i, x in enumerate(s.skeleton) if x.name}
+    out = {}
+    for side in ("Left", "Right"):
+        for a, b in (("Arm", "ForeArm"), ("ForeArm", "Hand"), ("UpLeg", "Leg"), ("Leg", "Foot")):
+            d = [f.values[3 * at[side + b] + k] - f.values[3 * at[side + a] + k] for k in range(3)]
+            n = math.hypot(*d)
+            out[side + a] = [x / n for x in d]
+    return out
+places = {}
+for style in "mixamo unreal unreal-y makehuman rigify metarig asf few vrm".split():
+    s, worst = read_stream.read_stream(style + "-back.vgs"), 0
+    assert len(s.frames) == len(truth.frames) == 12
+    for f, g in zip(truth.frames, s.frames):
+        a, b = limbs(truth, f), limbs(s, g)
+        for k in a: worst = max(worst, math.degrees(math.acos(max(-1, min(1, sum(x * y for x, y in zip(a[k], b[k])))))))
+    # every limb whose rest pose differs is aligned; what the motion did to it arrives
+    assert worst < 0.01, (style, worst)
+    places[style] = [f.values for f in s.frames]
+# the up axis changes nothing else
+assert max(abs(a - b) for f, g in zip(places["unreal"], places["unreal-y"]) for a, b in zip(f, g)) < 1e-3
+END
+    # --align none leaves rest poses and axes as they are
+    must vg-deform --align none --onto cmu.bvh asf.bvh -o no.vgs
+    [ "$(vg-deform --align none --onto cmu.bvh unreal.bvh -o no.vgs 2>&1 | grep -c upright)" = 0 ]
+}

@@ -498,6 +498,17 @@ END
     must_warn vg-play man.rig cmu.vgs -o out.vgs
     says 'aligned LeftArm (49 degrees), LeftForeArm (60)'
     at_most "$(vertex_error mean --centred walk.vgs out.vgs)" 0.001 # 0.0005; arms inside out: 0.12
+    # the same capture by other conventions' names, order, rest poses, units, axes, with more joints and with fewer
+    for style in mixamo unreal makehuman rigify asf few vrm; do
+        py "$VG_DATA/mocap/cmu-02_01.bvh" $style <<END
+import sys
+sys.path.insert(0, "$ROOT/tests")
+import conventions
+conventions.convert(sys.argv[1], sys.argv[2], "style.bvh", 4)
+END
+        must_warn vg-play man.rig style.bvh -o style.vgs
+        at_most "$(vertex_error mean --centred walk.vgs style.vgs)" 0.02 # of D: 0.0132 to 0.0193, for what their legs rest apart
+    done
     must_warn vg-play man.rig --feet cmu.vgs -o feet.vgs
     at_most "$(vertex_error mean --centred walk.vgs feet.vgs)" 0.003
     # the left foot stands from pose 4 to 18: how far its toe and its sole go meanwhile, in body heights

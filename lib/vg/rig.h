@@ -21,7 +21,7 @@ int vg_skeleton_pair(const vg_skeleton *of, const vg_skeleton *by, uint32_t *par
 typedef struct vg_driver vg_driver;
 typedef enum vg_align {
     VG_ALIGN_AUTO = 0, /* if a limb differs by more than 20 degrees at rest: all limbs that differ by more than 10 */
-    VG_ALIGN_NONE,     /* no alignment: both rest poses as they are */
+    VG_ALIGN_NONE,     /* no alignment: both rest poses and their axes as they are */
     VG_ALIGN_ALL,      /* all joints that have children */
     VG_ALIGN_CHOSEN    /* those of `chosen` */
 } vg_align;
@@ -39,6 +39,10 @@ size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow th
 /* vg_driver_aligned: the angle in degrees by which a joint of the rig was aligned with the other skeleton; 0: it
  * was not. */
 double vg_driver_aligned(const vg_driver *d, size_t joint);
+/* vg_driver_stands: the axis that is up for the other skeleton at rest, if it is not that of the rig: 1, 2, 3 for x, y, z, or the
+ * negative; its motion is turned upright. 0: the same axis, or it is not known. faces: whether it faces along another axis at
+ * rest, which is made up for. */
+int vg_driver_stands(const vg_driver *d, bool *faces);
 /* vg_driver_pose: positions and turns of the other skeleton's joints to nbones transforms. */
 void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms);
 /* vg_driver_joints: to positions and turns of the rig's own joints; both are borrowed until the next call. */

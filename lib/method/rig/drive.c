@@ -17,6 +17,7 @@ struct vg_driver {
     bool *carried;   /* per joint of the rig: paired, with no paired joint above it */
     double *before;  /* per joint of the rig: a rotation applied before the other's, 4 numbers */
     double *degrees; /* per joint of the rig: the angle of alignment */
+    vgi_stance stance;
     double scale;
     size_t missing;
     double *positions, *turns; /* of the joints of the rig */
@@ -46,9 +47,15 @@ static int compare_rests(vg_driver *d, const vg_driver_options *o, vg_err *e)
     int r = vgi_rests_new(&x, &d->r->skeleton, d->by, d->from, e);
     if (r == VG_OK) {
         d->scale = compare_sizes(d, &x);
+        d->stance = (vgi_stance){.world = {1, 0, 0, 0}, .rest = {1, 0, 0, 0}};
+        if (o->align != VG_ALIGN_NONE) vgi_rests_stand(&x, &d->stance);
         r = vgi_align(&x, o->align, o->chosen, d->before, d->degrees, e);
     }
     vgi_rests_clear(&x);
+    for (size_t j = 0; r == VG_OK && j < d->r->skeleton.njoints; j++) { /* first back to how the other one rests */
+        const double *q = d->stance.rest, back[4] = {q[0], -q[1], -q[2], -q[3]};
+        vg_quat_multiply(back, d->before + 4 * j, d->before + 4 * j);
+    }
     return r;
 }
 
@@ -111,6 +118,12 @@ double vg_driver_aligned(const vg_driver *d, size_t joint)
     return d->degrees[joint];
 }
 
+int vg_driver_stands(const vg_driver *d, bool *faces)
+{
+    *faces = d->stance.faces;
+    return d->stance.up;
+}
+
 /* Offset of the other's joint k from the end of its bone, as position channels cause it. */
 static void read_slip(const vg_driver *d, size_t k, const double *positions, const double *turns, double slip[3])
 {
@@ -119,14 +132,17 @@ static void read_slip(const vg_driver *d, size_t k, const double *positions, con
     if (parent == NONE) return;
     vg_quat_apply(turns + 4 * (size_t)parent, d->by->joints[k].offset, at);
     vgi_subtract(positions + 3 * k, at, slip), vgi_deduct(slip, positions + 3 * (size_t)parent);
+    vg_quat_apply(d->stance.world, slip, slip);
 }
 
 static void turn_joint(vg_driver *d, size_t j, const double *turns)
 {
     uint32_t from = d->from[j], parent = d->r->skeleton.joints[j].parent;
     double *q = d->turns + 4 * j;
-    if (from != NONE) vg_quat_multiply(turns + 4 * (size_t)from, d->before + 4 * j, q);
-    else if (parent != NONE) memcpy(q, d->turns + 4 * (size_t)parent, 4 * sizeof *q);
+    if (from != NONE) {
+        vg_quat_multiply(d->stance.world, turns + 4 * (size_t)from, q);
+        vg_quat_multiply(q, d->before + 4 * j, q);
+    } else if (parent != NONE) memcpy(q, d->turns + 4 * (size_t)parent, 4 * sizeof *q);
     else memcpy(q, (const double[4]){1, 0, 0, 0}, 4 * sizeof *q);
 }
 
@@ -137,7 +153,8 @@ static void place_joint(vg_driver *d, size_t j, const double *positions, const d
     double *p = d->positions + 3 * j, slip[3] = {0, 0, 0};
     uint32_t from = d->from[j];
     if (d->carried[j]) {
-        vgi_scaled(d->scale, positions + 3 * (size_t)from, p);
+        vg_quat_apply(d->stance.world, positions + 3 * (size_t)from, p);
+        vgi_scale(p, d->scale);
         return;
     }
     if (joint->parent == NONE) {

@@ -45,7 +45,10 @@ static const struct {
              {"shin", VGI_SHIN},          {"calf", VGI_SHIN},         {"leg", VGI_SHIN},
              {"lowleg", VGI_SHIN},        {"lowerleg", VGI_SHIN},     {"knee", VGI_SHIN},
              {"foot", VGI_FOOT},          {"ankle", VGI_FOOT},        {"toe", VGI_TOE},
-             {"toes", VGI_TOE},           {"toebase", VGI_TOE},       {"ball", VGI_TOE}};
+             {"toes", VGI_TOE},           {"toebase", VGI_TOE},       {"ball", VGI_TOE},
+             {"upperback", VGI_SPINE},    {"thorax", VGI_SPINE},      {"lowerneck", VGI_NECK},
+             {"upperneck", VGI_NECK},     {"humerus", VGI_UPPER_ARM}, {"radius", VGI_FOREARM},
+             {"fingers", VGI_INDEX},      {"femur", VGI_THIGH},       {"tibia", VGI_SHIN}};
 
 /* The name after the last ':' or '|' and after a known prefix. */
 static const char *without_prefix(const char *name)
@@ -106,13 +109,21 @@ static key read_key(const char *name)
     return k;
 }
 
+static vgi_part find_part(const char *text)
+{
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        if (!strcmp(text, parts[i].text)) return parts[i].part;
+    return VGI_NO_PART;
+}
+
 static vgi_role look_up(const char *name)
 {
     key k = read_key(name);
-    vgi_role role = {.side = (int8_t)k.side};
+    vgi_part part = find_part(k.text);
+    if (!part && !k.side && (*k.text == 'l' || *k.text == 'r')) /* CMU's own files: "lfemur" */
+        if ((part = find_part(k.text + 1))) k.side = *k.text == 'l' ? 1 : -1;
+    vgi_role role = {.side = (int8_t)k.side, .part = (uint8_t)part};
     if (!strcmp(k.text, "finger") && k.number >= 1 && k.number <= 5) role.part = (uint8_t)(VGI_THUMB + k.number - 1);
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        if (!strcmp(k.text, parts[i].text)) role.part = (uint8_t)parts[i].part;
     if (role.part == VGI_HIPS && role.side) role.part = VGI_SIDED_HIP;
     if ((role.part >= VGI_CLAVICLE) != (role.side != 0)) role = (vgi_role){0};
     return role;
