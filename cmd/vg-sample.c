@@ -210,13 +210,13 @@ static void label(vg_frame *f, const vg_signal *s, const plan *p, size_t i)
 static void sample_batch(vg_sampler *sampler, const vg_signal *s, const plan *p, size_t first, size_t n, double *x,
                          vg_frame *frames, making *m, size_t nv)
 {
-    double *shapes[VG_SAMPLER_BATCH], at[2];
+    double *shapes[VG_SAMPLER_BATCH], at[2 * VG_SAMPLER_BATCH];
     for (size_t i = 0; i < n; i++) {
-        if (p->place) memcpy(at, p->place + 2 * (first + i), sizeof at);
-        else vg_sampler_position(sampler, p->time[first + i], at);
-        vg_sampler_coordinates(sampler, at, x + i * s->m);
+        if (p->place) memcpy(at + 2 * i, p->place + 2 * (first + i), 2 * sizeof *at);
+        else vg_sampler_position(sampler, p->time[first + i], at + 2 * i);
         shapes[i] = m->unshaper ? m->shapes + i * s->d : frames[i].values;
     }
+    vg_sampler_coordinates(sampler, n, at, x);
     vg_sampler_shapes(sampler, n, x, shapes);
     for (size_t i = 0; i < n; i++) {
         if (m->unshaper) finish_vectors(m, sampler, p->time ? p->time + first + i : NULL, shapes[i], &frames[i]);

@@ -554,7 +554,7 @@ static void add_sampled(vg_page *page, side *s)
     if (vg_sampler_new(&sampler, signal, false, &e) < 0 || vg_frame_shape(&s->frame, s->head, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < signal->n; i++) {
         vg_sampler_position(sampler, (double)i + 1, at);
-        vg_sampler_coordinates(sampler, at, x);
+        vg_sampler_coordinates(sampler, 1, at, x);
         vg_sampler_shapes(sampler, 1, x, &s->frame.values);
         vg_sampler_place(sampler, (double)i + 1, s->head->body.mesh.nv, s->frame.values);
         s->frame.has_time = signal->timed;

@@ -7,6 +7,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "numeric/lapack.h"
+#include "signal/rows_kernel.h"
 #include "signal/signal.h"
 
 #include <math.h>
@@ -15,7 +16,8 @@
 
 enum {
     TILE = 128,    /* rows per tile of a Gram matrix */
-    STRIPE = 3072  /* numbers of a pose processed at a time: a multiple of 3 */
+    STRIPE = 3072, /* numbers of a pose processed at a time: a multiple of 3 */
+    SHORT = 512    /* the same for a tile, of which a stripe stays in the cache */
 };
 
 void vgi_basis_clear(vgi_basis *b)
@@ -34,7 +36,8 @@ typedef struct job {
     size_t nrows, length;
     double *gram;
     const double *weight; /* rank x n: vectors = weight * centred */
-    const double *factor; /* rank x rank, lower */
+    const double *inverse; /* rank x rank, lower, packed */
+    double *const *to;     /* the vectors */
     const double *x;      /* for an error */
     size_t stride, m;
     size_t first;         /* of the stripes measured at a time */
@@ -53,6 +56,14 @@ static size_t width_of(size_t d, size_t stripe)
 
 /* ---- Gram matrices, tile by tile ---- */
 
+/* A tile on the diagonal: its lower triangle. */
+static void gram_of_rows(size_t n, size_t d, const double *rows, double *g, size_t ldg)
+{
+    for (size_t i = 0; i < n; i++) memset(g + i * ldg, 0, (i + 1) * sizeof *g);
+    for (size_t first = 0; first < d; first += SHORT)
+        vgi_rows_kernel_now()->gram(n, d - first < SHORT ? d - first : SHORT, rows + first, d, g, ldg);
+}
+
 static void gram_tile(void *context, size_t index)
 {
     job *j = context;
@@ -60,7 +71,7 @@ static void gram_tile(void *context, size_t index)
     while ((row + 1) * (row + 2) / 2 <= index) row++;
     size_t column = index - row * (row + 1) / 2, i = row * TILE, k = column * TILE;
     size_t height = n - i < TILE ? n - i : TILE, width = n - k < TILE ? n - k : TILE;
-    if (row == column) vgi_product_gram(height, d, j->rows + i * d, d, j->gram + i * n + k, n);
+    if (row == column) gram_of_rows(height, d, j->rows + i * d, j->gram + i * n + k, n);
     else vgi_product_double_transposed(height, width, d, j->rows + i * d, d, j->rows + k * d, d, j->gram + i * n + k, n);
 }
 
@@ -101,7 +112,31 @@ static void straighten_stripe(void *context, size_t s)
 {
     job *j = context;
     vgi_basis *b = j->b;
-    vgi_solve_lower_stripe(b->rank, j->factor, width_of(b->d, s), b->vectors + s * STRIPE, b->d);
+    vgi_product p = {.rows = b->rank, .depth = b->rank, .first = s * STRIPE, .end = s * STRIPE + width_of(b->d, s),
+                     .a = j->inverse, .lower = true, .b = b->vectors, .ldb = b->d, .to = j->to,
+                     .room = j->room + s * b->rank * VGI_TILE};
+    vgi_rows_kernel_now()->multiply(&p);
+}
+
+/* vectors := factor^-1 vectors. The factor is near 1, so that its inverse is as good as solving. */
+static int straighten(vgi_basis *b, const double *factor, int threads, vg_err *e)
+{
+    size_t rank = b->rank;
+    double *inverse = vgi_array(rank * rank, sizeof *inverse, e), *packed = vgi_array(vgi_packed(rank, rank), sizeof *packed, e);
+    double **to = vgi_array(rank, sizeof *to, e), *room = vgi_array_raw(stripes(b->d) * rank, VGI_TILE * sizeof *room, e);
+    int r = inverse && packed && to && room ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) {
+        for (size_t i = 0; i < rank; i++) inverse[i * rank + i] = 1, to[i] = b->vectors + i * b->d;
+        vgi_solve_lower(rank, factor, rank, inverse);
+        vgi_pack_rows(rank, rank, inverse, packed);
+        vgi_parallel(threads, stripes(b->d), straighten_stripe,
+                     &(job){.b = b, .inverse = packed, .to = to, .room = room});
+    }
+    free(inverse);
+    free(packed);
+    free(to);
+    free(room);
+    return r;
 }
 
 /* weight := factor^-1 weight, so that still vectors = weight * centred */
@@ -112,13 +147,12 @@ static int make_vectors(vgi_basis *b, double *weight, int threads, vg_err *e)
     if (!g) return VG_ENOMEM;
     vgi_parallel(threads, stripes(b->d), multiply_stripe, &(job){.b = b, .weight = weight});
     vgi_gram(rank, b->d, b->vectors, g, threads);
-    bool definite = vgi_spd_factor(rank, g);
-    if (definite) {
-        vgi_parallel(threads, stripes(b->d), straighten_stripe, &(job){.b = b, .factor = g});
-        vgi_solve_lower(rank, g, b->n, weight);
-    }
+    int r = vgi_spd_factor(rank, g)
+                ? straighten(b, g, threads, e)
+                : vg_fail(e, VG_EINPUT, "the poses cannot be told apart from their rounding errors");
+    if (r == VG_OK) vgi_solve_lower(rank, g, b->n, weight);
     free(g);
-    return definite ? VG_OK : vg_fail(e, VG_EINPUT, "the poses cannot be told apart from their rounding errors");
+    return r;
 }
 
 static void make_coordinates(vgi_basis *b, const double *g, const double *weight)
@@ -131,19 +165,10 @@ static void make_coordinates(vgi_basis *b, const double *g, const double *weight
                                       b->x + large, b->rank);
 }
 
-/* Process a stripe of all poses at a time, so that they are read from memory once. */
 static int centre(vgi_basis *b, vg_err *e)
 {
-    enum { FEW = 256 };
     if (!(b->mean = vgi_array(b->d, sizeof *b->mean, e))) return VG_ENOMEM;
-    for (size_t first = 0; first < b->d; first += FEW) {
-        size_t end = b->d - first < FEW ? b->d : first + FEW;
-        for (size_t i = 0; i < b->n; i++)
-            for (size_t c = first; c < end; c++) b->mean[c] += b->centred[i * b->d + c];
-        for (size_t c = first; c < end; c++) b->mean[c] /= (double)b->n;
-        for (size_t i = 0; i < b->n; i++)
-            for (size_t c = first; c < end; c++) b->centred[i * b->d + c] -= b->mean[c];
-    }
+    vgi_rows_kernel_now()->centre(b->n, b->d, b->centred, b->d, b->mean);
     return VG_OK;
 }
 

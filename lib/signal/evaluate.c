@@ -1,10 +1,11 @@
 /* evaluate.c: evaluates a signal at any time: curve, surface, shapes.
  *
- * Shapes are products of a batch of coordinates with the basis, a stripe of it at a time, which stays in the cache. The
- * batch always has the same size, so that a shape does not depend on the others in it. Signals are fitted in fit.c.
+ * Shapes are products of a batch of coordinates with the basis. In binary32, where BLAS does it, the batch always has the
+ * same size, so that a shape does not depend on the others in it. Signals are fitted in fit.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/curve.h"
+#include "signal/rows_kernel.h"
 #include "signal/root.h"
 #include "signal/signal.h"
 
@@ -18,11 +19,11 @@ struct vg_sampler {
     vgi_plate plate;
     vgi_curve curve;
     double *coefficients; /* l x m */
-    double *functions;    /* l */
+    double *functions, *packed, *room;   /* batch x l; batch x l or m; l or m x VGI_TILE */
     double *turn_second, *shift_second; /* of the root */
     bool single;
-    double *basis, *x, *shape;             /* m x d, batch x m, batch x stripe */
-    float *basis_single, *x_single, *shape_single;
+    double *basis;                        /* m x d */
+    float *basis_single, *x_single, *shape_single; /* m x d, batch x m, batch x stripe */
     bool borrowed;                         /* the basis is borrowed from the signal */
 };
 
@@ -95,8 +96,7 @@ static int take_basis(vg_sampler *p, vg_err *e)
     if (p->single)
         return (p->x_single = vgi_array(VG_SAMPLER_BATCH, (s->m + 1) * sizeof(float), e)) &&
                (p->shape_single = vgi_array_raw(room, sizeof(float), e)) ? VG_OK : VG_ENOMEM;
-    return (p->x = vgi_array(VG_SAMPLER_BATCH, (s->m + 1) * sizeof(double), e)) &&
-           (p->shape = vgi_array_raw(room, sizeof(double), e)) ? VG_OK : VG_ENOMEM;
+    return VG_OK;
 }
 
 static int take_root(vg_sampler *p, vg_err *e)
@@ -115,6 +115,15 @@ static int take_root(vg_sampler *p, vg_err *e)
     return r;
 }
 
+static int take_rooms(vg_sampler *p, vg_err *e)
+{
+    size_t l = p->plate.l, depth = l > p->s->m ? l : p->s->m + 1;
+    return (p->coefficients = vgi_array(l * p->s->m + 1, sizeof(double), e)) &&
+           (p->functions = vgi_array(l, VG_SAMPLER_BATCH * sizeof(double), e)) &&
+           (p->packed = vgi_array(vgi_packed(VG_SAMPLER_BATCH, depth), sizeof(double), e)) &&
+           (p->room = vgi_array_raw(depth, VGI_TILE * sizeof(double), e)) ? VG_OK : VG_ENOMEM;
+}
+
 int vg_sampler_new(vg_sampler **out, const vg_signal *s, bool single, vg_err *e)
 {
     vg_sampler *p = *out = vgi_array(1, sizeof *p, e);
@@ -123,9 +132,7 @@ int vg_sampler_new(vg_sampler **out, const vg_signal *s, bool single, vg_err *e)
     p->single = single;
     vgi_blas_alone();
     int r = vgi_plate_make(&p->plate, s->n, s->position, s->site, s->l, e);
-    if (r < 0 || !(p->coefficients = vgi_array(p->plate.l * s->m, sizeof *p->coefficients, e)) ||
-        !(p->functions = vgi_array(p->plate.l, sizeof *p->functions, e)) || vgi_signal_curve(s, &p->curve, e) < 0 ||
-        take_basis(p, e) < 0 || take_root(p, e) < 0) {
+    if (r < 0 || take_rooms(p, e) < 0 || vgi_signal_curve(s, &p->curve, e) < 0 || take_basis(p, e) < 0 || take_root(p, e) < 0) {
         vg_sampler_free(out);
         return VG_ENOMEM;
     }
@@ -148,9 +155,9 @@ void vg_sampler_free(vg_sampler **out)
     free(p->functions);
     free(p->turn_second);
     free(p->shift_second);
-    free(p->x);
+    free(p->packed);
     free(p->x_single);
-    free(p->shape);
+    free(p->room);
     free(p->shape_single);
     free(p);
     *out = NULL;
@@ -163,40 +170,51 @@ void vg_sampler_position(const vg_sampler *p, double time, double at[2])
     vgi_curve_at(&p->curve, time, at);
 }
 
-void vg_sampler_coordinates(vg_sampler *p, const double at[2], double *x)
+/* to (n rows of width numbers) := a (n x depth) b + add */
+static void multiply(vg_sampler *p, size_t n, size_t depth, const double *a, size_t width, const double *b, const double *add,
+                     double *const *to)
 {
-    size_t m = p->s->m;
-    vgi_plate_functions(&p->plate, p->plate.l, at, p->functions);
-    if (m) vgi_product_double(1, m, p->plate.l, p->functions, p->plate.l, p->coefficients, m, x, m);
+    vgi_pack_rows(n, depth, a, p->packed);
+    vgi_rows_kernel_now()->multiply(&(vgi_product){.rows = n, .depth = depth, .end = width, .a = p->packed, .b = b,
+                                                   .ldb = width, .add = add, .to = to, .room = p->room});
 }
 
-/* `width` numbers of n shapes, from the first on: the mean and what differs from it. */
-static void finish_stripe(const vg_sampler *p, size_t n, size_t first, size_t width, double *const *shapes)
+void vg_sampler_coordinates(vg_sampler *p, size_t n, const double *at, double *x)
 {
-    const double *mean = p->s->mean + first;
+    size_t m = p->s->m, l = p->plate.l;
+    double *to[VG_SAMPLER_BATCH];
     for (size_t i = 0; i < n; i++) {
-        double *to = shapes[i] + first;
-        for (size_t c = 0; c < width && p->single; c++) to[c] = mean[c] + (double)p->shape_single[i * width + c];
-        for (size_t c = 0; c < width && !p->single; c++) to[c] = mean[c] + p->shape[i * width + c];
+        vgi_plate_functions(&p->plate, l, at + 2 * i, p->functions + i * l);
+        to[i] = x + i * m;
+    }
+    if (m) multiply(p, n, l, p->functions, m, p->coefficients, NULL, to);
+}
+
+static void shapes_single(vg_sampler *p, size_t n, const double *x, double *const *shapes)
+{
+    size_t m = p->s->m, d = p->s->d;
+    for (size_t i = 0; i < n * m; i++) p->x_single[i] = (float)x[i];
+    for (size_t first = 0; first < d; first += STRIPE) {
+        size_t width = d - first < STRIPE ? d - first : STRIPE;
+        const double *mean = p->s->mean + first;
+        vgi_product_single(VG_SAMPLER_BATCH, width, m, p->x_single, m, p->basis_single + first, d, p->shape_single, width);
+        for (size_t i = 0; i < n; i++) {
+            const float *from = p->shape_single + i * width;
+            for (size_t c = 0; c < width; c++) shapes[i][first + c] = mean[c] + (double)from[c];
+        }
     }
 }
 
 void vg_sampler_shapes(vg_sampler *p, size_t n, const double *x, double *const *shapes)
 {
     size_t m = p->s->m, d = p->s->d;
-    if (!m) {
-        for (size_t i = 0; i < n; i++) memcpy(shapes[i], p->s->mean, d * sizeof(double));
+    if (p->single && m) {
+        shapes_single(p, n, x, shapes);
         return;
     }
-    if (p->single) for (size_t i = 0; i < n * m; i++) p->x_single[i] = (float)x[i];
-    else memcpy(p->x, x, n * m * sizeof *x);
-    for (size_t first = 0; first < d; first += STRIPE) {
-        size_t width = d - first < STRIPE ? d - first : STRIPE;
-        if (p->single)
-            vgi_product_single(VG_SAMPLER_BATCH, width, m, p->x_single, m, p->basis_single + first, d, p->shape_single, width);
-        else vgi_product_double(VG_SAMPLER_BATCH, width, m, p->x, m, p->basis + first, d, p->shape, width);
-        finish_stripe(p, n, first, width, shapes);
-    }
+    for (size_t i = 0; i < n && !m; i++) memcpy(shapes[i], p->s->mean, d * sizeof(double));
+    if (!m) return;
+    multiply(p, n, m, x, d, p->basis, p->s->mean, shapes);
 }
 
 bool vg_sampler_root(const vg_sampler *p, double time, double turn[4], double shift[3])

@@ -65,7 +65,7 @@ static int measure_trace(vg_trace *t, const vg_signal *s, vg_sampler *p, vg_err 
     for (size_t i = 0; r == VG_OK && i < t->n; i++) {
         double time = 1 + (double)i / (double)t->parts, *x = room, *smooth = room + m;
         vg_sampler_position(p, time, t->position + 2 * i);
-        vg_sampler_coordinates(p, t->position + 2 * i, x);
+        vg_sampler_coordinates(p, 1, t->position + 2 * i, x);
         vgi_natural_at(n, m, s->coordinate, second, time, smooth);
         for (size_t c = 0; c < m; c++) x[c] -= smooth[c];
         t->deviation[i] = length_of(m, products, x) / sqrt(fmax((double)s->d / 3, 1));

@@ -172,9 +172,9 @@ enum { VG_SAMPLER_BATCH = 64 };
 int vg_sampler_new(vg_sampler **p, const vg_signal *s, bool single, vg_err *e) VG_MUST_CHECK;
 void vg_sampler_free(vg_sampler **p);
 void vg_sampler_position(const vg_sampler *p, double time, double at[2]);       /* f */
-void vg_sampler_coordinates(vg_sampler *p, const double at[2], double *x); /* g: m numbers */
-/* vg_sampler_shapes: n <= VG_SAMPLER_BATCH times x m coordinates in, shapes (d numbers each) out. The same coordinates
- * give the same bits in whatever company. */
+/* vg_sampler_coordinates: g: of n <= VG_SAMPLER_BATCH points the m numbers of each. vg_sampler_shapes: of n times m
+ * coordinates the shapes (d numbers each). The same point gives the same bits in whatever company. */
+void vg_sampler_coordinates(vg_sampler *p, size_t n, const double *at, double *x);
 void vg_sampler_shapes(vg_sampler *p, size_t n, const double *x, double *const *shapes);
 /* vg_sampler_place: vertices where the root takes them at a time; nothing when the signal has no root. */
 void vg_sampler_place(const vg_sampler *p, double time, size_t nv, double *vertices);

@@ -152,7 +152,7 @@ static int sample_vectors(chart *c, vg_sampler *p, double *x, double *const *poi
     int r = shape ? vg_head_graph(&g, c->h, e) : VG_ENOMEM;
     if (r == VG_OK) r = vg_unshaper_new(&u, c->s, g, c->h->body.reference, e);
     for (size_t i = 0; r == VG_OK && i < c->nposes; i++) {
-        vg_sampler_coordinates(p, c->s->position + 2 * c->frame[i].index, x);
+        vg_sampler_coordinates(p, 1, c->s->position + 2 * c->frame[i].index, x);
         vg_sampler_shapes(p, 1, x, &shape);
         r = vgi_unshaper_vertices(u, shape, points[i], e);
     }
@@ -165,7 +165,7 @@ static int sample_vectors(chart *c, vg_sampler *p, double *x, double *const *poi
 static void sample_vertices(chart *c, vg_sampler *p, double *x, double *const *points)
 {
     for (size_t i = 0; i < c->nposes; i++) {
-        vg_sampler_coordinates(p, c->s->position + 2 * c->frame[i].index, x);
+        vg_sampler_coordinates(p, 1, c->s->position + 2 * c->frame[i].index, x);
         vg_sampler_shapes(p, 1, x, points + i);
     }
 }

@@ -29,7 +29,7 @@ static void sample(const vg_signal *s)
     for (double time = 0.5; time < FRAMES + 1; time += 0.25) {
         vg_sampler_position(p, time, at);
         if (!isfinite(at[0]) || !isfinite(at[1])) abort();
-        vg_sampler_coordinates(p, at, x);
+        vg_sampler_coordinates(p, 1, at, x);
         vg_sampler_shapes(p, 1, x, shapes);
     }
     vg_sampler_free(&p);

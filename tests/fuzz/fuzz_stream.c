@@ -35,7 +35,7 @@ static void use_signal(const vg_head *h)
     }
     for (double time = 0.5; r == VG_OK && time <= 4; time += 0.75) {
         vg_sampler_position(p, time, at);
-        vg_sampler_coordinates(p, at, x);
+        vg_sampler_coordinates(p, 1, at, x);
         vg_sampler_shapes(p, 1, x, (double *const[]){shape});
         if (u && vgi_finite(shape, s->d)) (void)!vg_unshaper_vectors(u, shape, vectors, &e);
         else if (!u) vg_sampler_place(p, time, h->body.mesh.nv, shape);

@@ -3,6 +3,7 @@
  * same formula.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "dense.h"
+#include "signal/rows_kernel.h"
 #include "signal/signal.h"
 
 enum { N = 48, D = 30 };
@@ -528,6 +529,88 @@ static void crossings(void)
     free(list);
 }
 
+/* ---- products of rows ---- */
+
+enum { LDA = 61 };
+
+static double *numbers(size_t n)
+{
+    double *x = room(n, sizeof *x);
+    for (size_t i = 0; i < n; i++) x[i] = sin(1 + 1.7 * (double)i + 1e-3 * (double)(i * i));
+    return x;
+}
+
+/* Sums of exact terms of which each has an error of at most half a unit of its own: 1e-14 is far above that of 20 of them. */
+static void multiply_rows(size_t rows, size_t depth, size_t first, size_t end, bool lower)
+{
+    double *a = numbers(rows * depth), *b = numbers(depth * LDA), *add = numbers(LDA), *packed = room(vgi_packed(rows, depth), 8);
+    double *tile = room(depth * VGI_TILE, sizeof *tile), *out = room(rows * LDA, sizeof *out), *to[16], worst = 0;
+    for (size_t i = 0; i < rows && lower; i++)
+        for (size_t k = i + 1; k < depth; k++) a[i * depth + k] = 0;
+    for (size_t i = 0; i < rows; i++) to[i] = (lower ? b : out) + i * LDA;
+    for (size_t i = 0; i < rows * LDA; i++) out[i] = 7;
+    double *before = room(depth * LDA, sizeof *before);
+    memcpy(before, b, depth * LDA * sizeof *b);
+    vgi_pack_rows(rows, depth, a, packed);
+    vgi_rows_kernel_now()->multiply(&(vgi_product){.rows = rows, .depth = depth, .first = first, .end = end, .a = packed,
+                                                   .lower = lower, .b = b, .ldb = LDA, .add = lower ? NULL : add, .to = to,
+                                                   .room = tile});
+    for (size_t i = 0; i < rows; i++)
+        for (size_t c = 0; c < LDA; c++) {
+            double sum = lower ? 0 : add[c];
+            for (size_t k = 0; k < depth; k++) sum += a[i * depth + k] * before[k * LDA + c];
+            if (c < first || c >= end) sum = lower ? before[i * LDA + c] : 7; /* as it was */
+            worst = fmax(worst, fabs(to[i][c] - sum));
+        }
+    CHECK_NEAR(worst, 0, 1e-14);
+    free(a), free(b), free(add), free(packed), free(tile), free(out), free(before);
+}
+
+static void gram_of_rows(size_t n, size_t width)
+{
+    double *a = numbers(n * LDA), *g = room(n * (n + 2), sizeof *g), worst = 0;
+    vgi_rows_kernel_now()->gram(n, width, a, LDA, g, n + 2);
+    vgi_rows_kernel_now()->gram(n, width, a, LDA, g, n + 2); /* added */
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n + 2; j++) {
+            double sum = 0;
+            for (size_t c = 0; c < width && j <= i; c++) sum += 2 * a[i * LDA + c] * a[j * LDA + c];
+            worst = fmax(worst, fabs(g[i * (n + 2) + j] - sum));
+        }
+    CHECK_NEAR(worst, 0, 1e-13);
+    free(a), free(g);
+}
+
+static void centred_rows(size_t n, size_t width)
+{
+    double *a = numbers(n * LDA), *mean = room(width, sizeof *mean), worst = 0;
+    vgi_rows_kernel_now()->centre(n, width, a, LDA, mean);
+    double *before = numbers(n * LDA);
+    for (size_t c = 0; c < LDA; c++) {
+        double sum = 0;
+        for (size_t i = 0; i < n && c < width; i++) sum += before[i * LDA + c] / (double)n;
+        for (size_t i = 0; i < n; i++) worst = fmax(worst, fabs(before[i * LDA + c] - sum - a[i * LDA + c]));
+        if (c < width) worst = fmax(worst, fabs(mean[c] - sum));
+    }
+    CHECK_NEAR(worst, 0, 1e-15);
+    free(a), free(before), free(mean);
+}
+
+static void products_of_rows(void)
+{
+    for (size_t set = 0; vg_isa_at(set); set++) {
+        if (vg_isa_choose(vg_isa_at(set), NULL) < 0) abort();
+        for (size_t rows = 1; rows <= 13; rows++)
+            for (size_t end = 1; end <= LDA; end += 4) {
+                multiply_rows(rows, 1 + end % 9, end / 3, end, false);
+                multiply_rows(rows, rows, end / 2, end, true);
+            }
+        for (size_t n = 1; n <= 13; n++)
+            for (size_t width = 1; width <= LDA; width += 5) gram_of_rows(n, width), centred_rows(n, width);
+    }
+    if (vg_isa_choose(NULL, NULL) < 0) abort();
+}
+
 TESTS({"principal components", principal_components}, {"errors of fewer vectors", errors_of_fewer_vectors},
       {"components of small motion", components_of_small_motion}, {"stress falls", stress_falls},
       {"flat shapes are met", flat_shapes_are_met}, {"held frames stay", held_frames_stay},
@@ -535,4 +618,4 @@ TESTS({"principal components", principal_components}, {"errors of fewer vectors"
       {"plates know no unit", plates_know_no_unit}, {"degenerate planes", degenerate_planes},
       {"every knot helps", every_knot_helps}, {"control is local", control_is_local},
       {"time runs forward", time_runs_forward}, {"natural splines", natural_splines}, {"layouts", layouts},
-      {"crossings", crossings})
+      {"crossings", crossings}, {"products of rows", products_of_rows})
