@@ -290,6 +290,8 @@ static bool train_network(vg_trainer *t, vg_head *h, vg_train_state *s)
 
 /* ---- the report ---- */
 
+static const double damped_ridge = 1e6; /* with so large a ridge a regression is damped continuation */
+
 static void print_row(const char *name, const vg_network_errors *x, int method)
 {
     char text[200];
@@ -303,15 +305,15 @@ static void print_row(const char *name, const vg_network_errors *x, int method)
     cli_say("%s", text);
 }
 
-/* the method with the least error after three given frames */
+/* the method with the least error after three given frames, as shown; of equal ones the last */
 static int best_of(const vg_network_errors *x, int most)
 {
     int best = 0;
     double least = INFINITY;
     for (int m = 0; m < most; m++) {
         double sum = 0;
-        for (int i = 0; i < VG_NETWORK_FRAMES; i++) sum += isnan(x->at[1][m][i]) ? 0 : x->at[1][m][i];
-        if (sum < least) least = sum, best = m;
+        for (int i = 0; i < VG_NETWORK_FRAMES; i++) sum += isnan(x->at[1][m][i]) ? 0 : rint(100 * x->at[1][m][i]);
+        if (sum <= least) least = sum, best = m;
     }
     return best;
 }
@@ -335,6 +337,17 @@ static void report_errors(vg_trainer *t, const vg_train_state *s)
     int best = best_of(&x, VG_NETWORK_METHODS);
     if (best != VG_NETWORK_METHODS - 1)
         cli_say("the network is worse on held-out frames than '%s'", names[best]);
+}
+
+/* What the network goes on by, where that is less than regression and layers. */
+static void report_forecast(const vg_network *n, const vg_train_state *s)
+{
+    if (n->model != VG_NETWORK_AUTO) return;
+    bool damped = n->ridge >= damped_ridge, alone = !s->best_iteration && n->ncurve_block;
+    if (damped)
+        cli_say("in the training frames nothing is better than going on in a line, damped by %g a frame: the network goes on so%s",
+                n->damping, alone ? "" : ", with what its layers correct");
+    else if (alone) cli_say("the layers correct nothing in the validation block: the network is the regression alone");
 }
 
 /* Other outputs must have different names from the network. */
@@ -385,6 +398,7 @@ int main(int argc, char **argv)
     report_errors(t, &state);
     if (vg_trainer_network(t, true, &h->network, &e) < 0) cli_die(&e);
     vg_trainer_free(&t);
+    report_forecast(&h->network, &state);
     cli_stream_open(h);
     cli_stream_end(vg_source_tail(s));
     vg_source_close(&s);

@@ -50,23 +50,23 @@ static void take_frame(const vg_trainer *t, size_t i, double *to)
     for (size_t k = 0; k < t->net.numbers; k++) to[k] = (double)t->frames[i * t->net.numbers + k];
 }
 
-int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e)
+/* Mean distance of runs from `given` frames that start at every third frame of the block. */
+static int validate_from(vg_trainer *t, size_t given, double *error, vg_err *e)
 {
-    enum { GIVEN = 3, LONGEST = 12, SHORTEST = 5, APART = 3 };
+    enum { LONGEST = 12, SHORTEST = 5, APART = 3 };
     runs x;
     size_t n = t->net.numbers, total = 0, starts[NET_LANES], lengths[NET_LANES], lanes = 0;
     double sum = 0;
-    if (runs_make(&x, GIVEN, LONGEST, n, e) < 0) return VG_ENOMEM;
+    if (runs_make(&x, given, LONGEST, n, e) < 0) return VG_ENOMEM;
     int r = VG_OK;
-    vgi_blas_alone();
     for (size_t i = 0; r == VG_OK && i <= t->tried.n; i++) {
         size_t first = i < t->tried.n ? t->tried.at[i].first : 0, end = i < t->tried.n ? t->tried.at[i].end : 0;
         for (size_t s = first; s + SHORTEST <= end || (i == t->tried.n && lanes); s += APART) {
             if (i < t->tried.n) starts[lanes] = s, lengths[lanes++] = end - s < LONGEST ? end - s : LONGEST;
             if (lanes < NET_LANES && i < t->tried.n) continue;
             for (size_t l = 0; l < lanes; l++)
-                for (size_t g = 0; g < GIVEN; g++) take_frame(t, starts[l] - GIVEN + g, x.in[l] + g * n);
-            r = vgi_runner_go(&t->runner, false, lanes, GIVEN, (const double *const *)x.in, LONGEST, x.out, e);
+                for (size_t g = 0; g < given; g++) take_frame(t, starts[l] - given + g, x.in[l] + g * n);
+            r = vgi_runner_go(&t->runner, false, lanes, given, (const double *const *)x.in, LONGEST, x.out, e);
             for (size_t l = 0; r == VG_OK && l < lanes; l++, total++)
                 for (size_t g = 0; g < lengths[l]; g++)
                     sum += frame_distance(t->frames + (starts[l] + g) * n, x.out[l] + g * n, n) / (double)lengths[l];
@@ -74,9 +74,19 @@ int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e)
             if (i == t->tried.n || r < 0) break;
         }
     }
-    vgi_blas_shared();
     runs_clear(&x);
     *error = total ? sum / (double)total : INFINITY;
+    return r;
+}
+
+int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e)
+{
+    double from_one, from_three;
+    vgi_blas_alone();
+    int r = validate_from(t, 1, &from_one, e);
+    if (r == VG_OK) r = validate_from(t, 3, &from_three, e);
+    vgi_blas_shared();
+    *error = r == VG_OK ? (from_one + from_three) / 2 : INFINITY;
     return r;
 }
 

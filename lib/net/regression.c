@@ -197,6 +197,8 @@ int vgi_regression_fit(vgi_regression *g, const vgi_frames *f, bool back, double
 
 /* ---- choice of the ridge ---- */
 
+static const double tiny = 1e-12; /* added to errors, which may be 0 */
+
 /* A sum of errors and their number. */
 typedef struct trial_sum {
     double sum;
@@ -229,7 +231,8 @@ static trial_sum try_out(const vgi_regression *g, const vgi_regression *back, co
     return all;
 }
 
-static const double ridges[] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10}, dampings[] = {0.8, 0.9, 0.95};
+/* The last ridge leaves nothing but damped continuation. */
+static const double ridges[] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10, 100, 1e9}, dampings[] = {0.8, 0.9, 0.95};
 enum { RIDGES = sizeof ridges / sizeof *ridges, DAMPINGS = sizeof dampings / sizeof *dampings, CHOICES = RIDGES * DAMPINGS };
 
 /* All choices in all folds: task i is choice i % n in fold i / n. */
@@ -262,8 +265,42 @@ static void try_one(void *context, size_t task)
     free(room);
 }
 
-/* Pick the best choice over all folds; unchanged if there is nothing to try it on. */
-static int pick_choice(choosing *c, size_t folds, int threads, vgi_choice *best, vg_err *e)
+/* Mean logarithm of the errors of choice i over those of choice `to` in the same folds (of the errors themselves with
+ * SIZE_MAX), and its standard error. Ratios, because a fold may be ten times as hard as another. */
+static double compare_choices(const choosing *c, size_t folds, size_t i, size_t to, double *deviation)
+{
+    double sum = 0, squares = 0, n = 0;
+    for (size_t f = 0; f < folds; f++) {
+        const trial_sum *x = &c->found[f * c->n + i], *y = to == SIZE_MAX ? NULL : &c->found[f * c->n + to];
+        if (!x->n) continue;
+        double ratio = log(x->sum / (double)x->n + tiny) - (y ? log(y->sum / (double)y->n + tiny) : 0);
+        sum += ratio, squares += ratio * ratio, n++;
+    }
+    *deviation = n > 1 ? sqrt(fmax(squares - sum * sum / n, 0) / (n - 1) / n) : 0;
+    return n > 0 ? sum / n : INFINITY;
+}
+
+/* The largest ridge that is no worse than the best choice by one standard error (Breiman et al. 1984): what is hardly
+ * better on the frames of the training is worse on motion unlike them. Unchanged if there is nothing to try on. */
+static void pick_choice(const choosing *c, size_t folds, vgi_choice *best)
+{
+    size_t least = 0, picked = SIZE_MAX;
+    double error = INFINITY, within = INFINITY, deviation;
+    for (size_t i = 0; i < c->n; i++) {
+        double mean = compare_choices(c, folds, i, SIZE_MAX, &deviation);
+        if (mean < error) error = mean, least = i;
+    }
+    for (size_t i = c->n; error < INFINITY && i-- > 0;) { /* in order of their ridges */
+        double mean = compare_choices(c, folds, i, least, &deviation);
+        bool same = picked != SIZE_MAX && c->choices[i].ridge == c->choices[picked].ridge &&
+                    c->choices[i].first_ridge == c->choices[picked].first_ridge;
+        if (!(mean <= deviation) || (picked != SIZE_MAX && !(same && mean < within))) continue;
+        within = mean, picked = i;
+    }
+    if (picked != SIZE_MAX) *best = c->choices[picked];
+}
+
+static int try_choices(choosing *c, size_t folds, int threads, vg_err *e)
 {
     c->found = vgi_array(folds * c->n, sizeof *c->found, e);
     c->code = vgi_array(folds * c->n, sizeof *c->code, e);
@@ -271,18 +308,9 @@ static int pick_choice(choosing *c, size_t folds, int threads, vgi_choice *best,
     vgi_blas_alone();
     vgi_parallel(threads, folds * c->n, try_one, c);
     vgi_blas_shared();
-    double least = INFINITY;
-    for (size_t i = 0; i < c->n; i++) {
-        trial_sum all = {0, 0};
-        for (size_t f = 0; f < folds; f++) {
-            if (c->code[f * c->n + i] == VG_ENOMEM)
-                return vg_fail(e, VG_ENOMEM, "out of memory: a regression of %zu numbers", c->folds->fitted.numbers);
-            all.sum += c->found[f * c->n + i].sum, all.n += c->found[f * c->n + i].n;
-        }
-        if (!all.n || !(all.sum / (double)all.n < least)) continue;
-        least = all.sum / (double)all.n;
-        *best = c->choices[i];
-    }
+    for (size_t i = 0; i < folds * c->n; i++)
+        if (c->code[i] == VG_ENOMEM)
+            return vg_fail(e, VG_ENOMEM, "out of memory: a regression of %zu numbers", c->folds->fitted.numbers);
     return VG_OK;
 }
 
@@ -298,7 +326,8 @@ int vgi_regression_choose(const vgi_fold *folds, size_t n, double size, int thre
             if (first) all[i].first_ridge = ridges[i];
             else all[i].ridge = ridges[i / DAMPINGS], all[i].damping = dampings[i % DAMPINGS], all[i].first_ridge = all[i].ridge;
         }
-        r = pick_choice(&c, n, threads, choice, e);
+        r = try_choices(&c, n, threads, e);
+        if (r == VG_OK) pick_choice(&c, n, choice);
         free(c.found);
         free(c.code);
     }

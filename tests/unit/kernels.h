@@ -5,6 +5,7 @@
 #define VG_TEST_KERNELS_H
 
 #include "net/layer_kernel.h"
+#include "net/product_kernel.h"
 #include "numeric/fronts_kernel.h"
 #include "signal/signal_kernel.h"
 #include "test.h"
@@ -185,6 +186,36 @@ static void check_convolution(size_t channels, bool mirrored)
             }
 }
 
+/* Rows and columns that fill no block, one, and several with a rest. */
+static void check_product(size_t rows, size_t columns)
+{
+    enum { MOST = 61 };
+    static float w[MOST * MOST];
+    static net_lanes x[MOST], y[MOST], before[MOST];
+    for (size_t i = 0; i < rows * columns; i++) w[i] = (float)ripple(i + rows);
+    for (int turned = 0; turned < 2; turned++)
+        for (int add = 0; add < 2; add++) {
+            size_t ins = turned ? rows : columns, outs = turned ? columns : rows;
+            fill(x, ins, 11), fill(before, outs, 5000);
+            memcpy(y, before, sizeof y);
+            if (turned) net_product_kernel_now()->multiply_turned(rows, columns, w, x, add, y);
+            else net_product_kernel_now()->multiply(rows, columns, w, x, add, y);
+            for (size_t o = 0; o < outs; o++)
+                for (size_t k = 0; k < NET_LANES; k++) {
+                    double sum = add ? before[o][k] : 0;
+                    for (size_t i = 0; i < ins; i++)
+                        sum += (double)x[i][k] * w[turned ? i * columns + o : o * columns + i];
+                    CHECK_NEAR(y[o][k], sum, 100 * tiny);
+                }
+        }
+}
+
+static void check_products(void)
+{
+    static const size_t sizes[][2] = {{1, 1}, {6, 2}, {5, 12}, {13, 27}, {61, 5}, {60, 61}};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) check_product(sizes[i][0], sizes[i][1]);
+}
+
 static void check_losses(void)
 {
     enum { ROWS = 300 };
@@ -218,6 +249,7 @@ static void check_layers(void)
         check_convolution(5, mirrored);
     }
     check_losses();
+    check_products();
 }
 
 /* ---- fronts ---- */

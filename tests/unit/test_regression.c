@@ -1,5 +1,6 @@
 /* test_regression.c: the regression of a sequence's next frame against closed forms.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/random.h"
 #include "net/regression.h"
 #include "test.h"
 
@@ -49,4 +50,52 @@ static void growing_motion_keeps_its_rhythm(void)
     vgi_regression_clear(&r);
 }
 
-TESTS({"stable motion is learned", stable_motion_is_learned}, {"growing motion keeps its rhythm", growing_motion_keeps_its_rhythm})
+/* ---- the choice of ridge and damping ---- */
+
+enum { FOLDS = 5, LENGTH = 40, NUMBERS = 4 };
+
+/* Each fold learns from one sequence and predicts another. */
+static vgi_choice choose(double (*rows)[2][LENGTH * NUMBERS])
+{
+    static const size_t start[2] = {0, LENGTH};
+    vgi_fold folds[FOLDS];
+    vgi_choice choice;
+    vg_err e;
+    for (int f = 0; f < FOLDS; f++)
+        folds[f] = (vgi_fold){{NUMBERS, LENGTH, 1, rows[f][0], start}, {NUMBERS, LENGTH, 1, rows[f][1], start}};
+    CHECK(vgi_regression_choose(folds, FOLDS, 1, 1, &choice, &e) == VG_OK);
+    return choice;
+}
+
+/* Steps that are 0.8 times the one before and an impulse that cannot be known: nothing is to be learned. */
+static void damped_motion_is_left_alone(void)
+{
+    static double rows[FOLDS][2][LENGTH * NUMBERS];
+    vgi_random numbers = vgi_random_start(1, 0);
+    for (int f = 0; f < FOLDS; f++)
+        for (int part = 0; part < 2; part++)
+            for (size_t k = 0; k < NUMBERS; k++) {
+                double step = 0, at = 0;
+                for (size_t t = 0; t < LENGTH; t++) {
+                    rows[f][part][t * NUMBERS + k] = at;
+                    step = 0.8 * step + vgi_random_normal(&numbers) * (f + 1); /* folds of different violence */
+                    at += step;
+                }
+            }
+    vgi_choice choice = choose(rows);
+    CHECK(choice.ridge >= 100);
+    CHECK_NEAR(choice.damping, 0.8, 0);
+}
+
+static void rhythm_is_learned(void)
+{
+    static double rows[FOLDS][2][LENGTH * NUMBERS];
+    for (int f = 0; f < FOLDS; f++)
+        for (int part = 0; part < 2; part++)
+            for (size_t i = 0; i < LENGTH * NUMBERS; i++)
+                rows[f][part][i] = cos(0.2 * (double)(i / NUMBERS) + (double)(i % NUMBERS) + 0.1 * (2 * f + part));
+    CHECK(choose(rows).ridge <= 1e-3);
+}
+
+TESTS({"stable motion is learned", stable_motion_is_learned}, {"growing motion keeps its rhythm", growing_motion_keeps_its_rhythm},
+      {"damped motion is left alone", damped_motion_is_left_alone}, {"rhythm is learned", rhythm_is_learned})
