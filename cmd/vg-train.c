@@ -343,11 +343,12 @@ static void report_errors(vg_trainer *t, const vg_train_state *s)
 static void report_forecast(const vg_network *n, const vg_train_state *s)
 {
     if (n->model != VG_NETWORK_AUTO) return;
+    void (*tell)(const char *, ...) = n->windows ? cli_say : cli_note;
     bool damped = n->ridge >= damped_ridge, alone = !s->best_iteration && n->ncurve_block;
     if (damped)
-        cli_say("in the training frames nothing is better than going on in a line, damped by %g a frame: the network goes on so%s",
-                n->damping, alone ? "" : ", with what its layers correct");
-    else if (alone) cli_say("the layers correct nothing in the validation block: the network is the regression alone");
+        tell("in the training frames nothing is better than going on in a line, damped by %g a frame: the network goes on so%s",
+             n->damping, alone ? "" : ", with what its layers correct");
+    else if (alone) tell("the layers correct nothing in the validation block: the network is the regression alone");
 }
 
 /* Other outputs must have different names from the network. */

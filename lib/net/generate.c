@@ -41,7 +41,7 @@ int vg_generator_new(vg_generator **out, const vg_network *n, const vg_mesh *m, 
         vg_feature_stats stats = vg_featurer_get_stats(g->featurer);
         const vgi_rings *rings = vgi_featurer_rings(g->featurer);
         g->main_part = stats.main_part;
-        r = stats.parts == n->parts ? vgi_runner_make(&g->runner, n, rings->first, rings->to, 2, e)
+        r = stats.parts == n->parts ? vgi_runner_make(&g->runner, n, rings->first, rings->to, NULL, e)
                                        : vg_fail(e, VG_EINPUT, "the network has a different number of components");
     }
     if (r == VG_OK) r = make_rooms(g, e);

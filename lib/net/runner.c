@@ -45,15 +45,16 @@ static int take_numbers(vgi_runner *u, vg_err *e)
     return VG_OK;
 }
 
-int vgi_runner_make(vgi_runner *u, const vg_network *n, const uint32_t *first, const uint32_t *to, size_t steps,
-                    vg_err *e)
+int vgi_runner_make(vgi_runner *u, const vg_network *n, const uint32_t *first, const uint32_t *to,
+                    const net_chains *chains, vg_err *e)
 {
     *u = (vgi_runner){.net = n};
     int r = vgi_network_shape(n, &u->shape, e);
     u->shape.first = first, u->shape.to = to;
     u->drive.shape = &u->shape;
     if (r == VG_OK) r = take_numbers(u, e);
-    if (r == VG_OK) r = net_chains_make(&u->chains, &u->shape, steps, e);
+    if (r == VG_OK && chains) u->chains = *chains, u->borrowed = true;
+    else if (r == VG_OK) r = net_chains_make(&u->chains, &u->shape, 2, e);
     if (r == VG_OK && (!(u->start = net_array(2 * n->layers * n->hidden, e)) ||
                           !(u->now = net_array(3 * n->numbers, e))))
         r = VG_ENOMEM;
@@ -65,7 +66,7 @@ int vgi_runner_make(vgi_runner *u, const vg_network *n, const uint32_t *first, c
 
 void vgi_runner_clear(vgi_runner *u)
 {
-    net_chains_clear(&u->chains);
+    if (!u->borrowed) net_chains_clear(&u->chains);
     free(u->scale);
     free(u->matrices);
     free(u->start);
@@ -87,6 +88,7 @@ void vgi_runner_begin(vgi_runner *u, bool back)
     u->begun = u->waiting = false, u->back = back;
     u->drive.parameters = u->net->parameters + (back && u->net->sets > 1 ? u->net->nparameters : 0);
     u->drive.forward = back ? 0 : NET_LANES;
+    if (u->shape.uncertain) memset(u->chains.noise, 0, u->shape.latent * sizeof *u->chains.noise);
     net_chains_begin(&u->chains, u->start);
 }
 

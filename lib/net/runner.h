@@ -18,14 +18,16 @@ typedef struct vgi_runner {
     float *scale, *matrices;  /* in the layers' type */
     vgi_regression backward, forward; /* views of net->regression */
     net_chains chains;        /* two steps: this one and the next */
+    bool borrowed;            /* the chains are somebody else's */
     net_lanes *start;         /* initial states */
     net_lanes *now, *before, *next; /* numbers each */
     bool begun, waiting, back; /* waiting: no step has been made from r->now */
 } vgi_runner;
 
-/* vgi_runner_make: first, to: neighbours of each vertex, borrowed. steps: of the chains, >= 2. */
-int vgi_runner_make(vgi_runner *r, const vg_network *n, const uint32_t *first, const uint32_t *to, size_t steps,
-                    vg_err *e) VG_MUST_CHECK;
+/* vgi_runner_make: first, to: neighbours of each vertex, borrowed. chains: NULL, or chains of this network to use,
+ * borrowed, of at least two steps. */
+int vgi_runner_make(vgi_runner *r, const vg_network *n, const uint32_t *first, const uint32_t *to,
+                    const net_chains *chains, vg_err *e) VG_MUST_CHECK;
 void vgi_runner_clear(vgi_runner *r);
 
 /* vgi_runner_states: initial states of all lanes: value, or with `random` value * normal numbers of that seed. */

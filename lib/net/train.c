@@ -72,21 +72,28 @@ int vg_trainer_new(vg_trainer **out, const vg_mesh *m, const double *reference, 
     return r;
 }
 
+/* Free the gradients. */
+static void clear_gradients(vg_trainer *t)
+{
+    for (size_t i = 0; t->gradient && i < t->ngradients; i++) free(t->gradient[i]);
+    free(t->gradient);
+    free(t->total);
+    t->gradient = NULL, t->total = NULL, t->ngradients = 0;
+}
+
 static void clear_phase(vg_trainer *t)
 {
     for (size_t i = 0; t->groups && i < t->ngroups; i++) net_group_clear(&t->groups[i]);
-    for (size_t i = 0; t->gradient && i < t->at_once; i++) free(t->gradient[i]);
+    clear_gradients(t);
     for (int w = 0; w < 2; w++) vgi_regression_clear(&t->regression[w]);
     free(t->fitted.at);
     free(t->tried.at);
     free(t->window);
     free(t->groups);
-    free(t->gradient);
-    free(t->total);
     free(t->before);
     vgi_runner_clear(&t->runner);
     t->fitted = t->tried = (vgi_spans){0};
-    t->window = NULL, t->before = NULL, t->groups = NULL, t->gradient = NULL, t->total = NULL;
+    t->window = NULL, t->before = NULL, t->groups = NULL;
     t->nwindows = t->ngroups = t->at_once = 0;
 }
 
@@ -296,8 +303,9 @@ static int make_groups(vg_trainer *t, vg_err *e)
     t->gradient = vgi_array(t->at_once, sizeof *t->gradient, e);
     t->total = vgi_array(all, sizeof *t->total, e);
     if (!t->groups || !t->gradient || !t->total) return VG_ENOMEM;
+    t->ngradients = t->ngroups > t->at_once ? t->at_once : t->at_once - 1;
     for (size_t i = 0; i < t->at_once; i++)
-        if (!(t->gradient[i] = vgi_array(all, sizeof **t->gradient, e)) ||
+        if ((i < t->ngradients && !(t->gradient[i] = vgi_array(all, sizeof **t->gradient, e))) ||
             net_group_make(&t->groups[i], &t->shape, t->o.direction, t->length, e) < 0)
             return VG_ENOMEM;
     return VG_OK;
@@ -328,7 +336,7 @@ static int begin_phase(vg_trainer *t, bool validate, vg_err *e)
     if (r == VG_OK) r = find_windows(t, e);
     if (r == VG_OK) r = start_parameters(t, e);
     if (r == VG_OK) r = make_groups(t, e);
-    if (r == VG_OK) r = vgi_runner_make(&t->runner, &t->net, rings->first, rings->to, 2, e);
+    if (r == VG_OK) r = vgi_runner_make(&t->runner, &t->net, rings->first, rings->to, &t->groups[0].chains[0], e);
     if (r < 0) return r;
     t->state.iteration = 0;
     t->state.phase = validate ? 0 : 1;
@@ -391,6 +399,12 @@ typedef struct working {
     net_loss loss[64];
 } working;
 
+/* The gradient of a group: the first one's is where the sum of all is made. */
+static float *gradient_of(const vg_trainer *t, size_t first, size_t i)
+{
+    return first + i ? t->gradient[i - !first] : t->total;
+}
+
 /* With n ranks, this process computes every nth group. */
 static void run_group(void *context, size_t number)
 {
@@ -400,8 +414,8 @@ static void run_group(void *context, size_t number)
     net_group *g = &t->groups[i];
     size_t size = vgi_group_size(t->o.direction), first = (w->first + i) * size, one = t->net.nparameters;
     net_drive d[2];
-    float *gradient[2] = {t->gradient[i], t->gradient[i] + (t->net.sets > 1 ? one : 0)};
-    memset(t->gradient[i], 0, t->net.sets * one * sizeof **t->gradient);
+    float *all = gradient_of(t, w->first, i), *gradient[2] = {all, all + (t->net.sets > 1 ? one : 0)};
+    memset(all, 0, t->net.sets * one * sizeof *all);
     g->n = t->o.batch - first < size ? t->o.batch - first : size;
     for (size_t k = 0; k < g->n; k++) g->start[k] = w->start[first + k];
     g->frames = t->frames, g->batch = t->o.batch, g->before = w->single ? t->before : NULL;
@@ -428,17 +442,17 @@ static int run_groups(vg_trainer *t, double *loss, vg_err *e)
     if (w.given >= t->length) w.given = t->length - 1;
     w.single = t->before && t->length > 3 && vgi_random_below(&numbers, SINGLE) == 0;
     if (w.single) w.given = 3;
-    memset(t->total, 0, all * sizeof *t->total);
     *loss = 0;
     vgi_blas_alone();
     for (w.first = 0; w.first < t->ngroups; w.first += t->at_once) {
         size_t n = t->ngroups - w.first < t->at_once ? t->ngroups - w.first : t->at_once, own = vgi_rank(), ranks = vgi_ranks();
         vgi_parallel(t->o.threads, n > own ? (n - own - 1) / ranks + 1 : 0, run_group, &w);
         for (size_t i = 0; i < n; i++) {
-            vgi_ranks_share(i % ranks, t->gradient[i], all);
+            float *one = gradient_of(t, w.first, i);
+            vgi_ranks_share(i % ranks, one, all);
             vgi_ranks_share_double(i % ranks, &w.loss[i % 64].frames, 1);
             *loss += w.loss[i % 64].frames;
-            for (size_t k = 0; k < all; k++) t->total[k] += t->gradient[i][k];
+            for (size_t k = 0; one != t->total && k < all; k++) t->total[k] += one[k];
         }
     }
     vgi_blas_shared();
@@ -490,6 +504,16 @@ static void train_iteration(vg_trainer *t)
 
 /* ---- number of iterations ---- */
 
+/* The training is over: free what only another iteration would need. */
+static void end_training(vg_trainer *t)
+{
+    t->ended = true;
+    clear_gradients(t);
+    free(t->moments);
+    free(t->best);
+    t->moments = t->best = NULL;
+}
+
 static void keep_best(vg_trainer *t, double error)
 {
     if (!(error < t->best_error)) return;
@@ -515,14 +539,14 @@ static int end_phase(vg_trainer *t, vg_err *e)
     uint64_t best = t->state.best_iteration;
     if (t->o.model != VG_NETWORK_AUTO) {
         memcpy(t->net.parameters, t->best, t->net.sets * t->net.nparameters * sizeof *t->best);
-        t->ended = true;
+        end_training(t);
         return VG_OK;
     }
     if (begin_phase(t, false, e) < 0) return e ? e->code : VG_ENOMEM;
     t->state.iterations = best;
     if (!best) {
         silence(t);
-        t->ended = true;
+        end_training(t);
     }
     return VG_OK;
 }
@@ -576,7 +600,7 @@ int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
     int r = t->ended ? VG_OK : begin_curve(t, e);
     bool last = t->state.iteration >= t->state.iterations || (!t->state.phase && has_waited(t));
     if (r == VG_OK && !t->ended && last) {
-        if (t->state.phase) t->ended = true;
+        if (t->state.phase) end_training(t);
         else r = end_phase(t, e);
     }
     if (r < 0 || t->ended) {
@@ -616,7 +640,7 @@ bool vg_train_any(bool yes)
 int vg_trainer_network(const vg_trainer *t, bool complete, vg_network *n, vg_err *e)
 {
     vg_network view = t->net;
-    if (!complete) {
+    if (!complete && !t->ended) {
         view.open = true;
         view.moments = t->moments, view.best = t->best;
         view.phase = (uint64_t)t->state.phase, view.best_iteration = t->state.best_iteration, view.best_error = t->best_error;

@@ -29,7 +29,8 @@ struct vg_trainer {
                                see net_group */
     net_group *groups;
     size_t ngroups, at_once; /* at_once groups run at a time */
-    float **gradient;       /* at_once x sets * nparameters */
+    float **gradient;       /* ngradients x sets * nparameters: of all groups at a time but the first, which uses total */
+    size_t ngradients;
     float *total, *moments, *best;
     vgi_runner runner;
     bool ready, ended;
