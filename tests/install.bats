@@ -88,7 +88,8 @@ END
     must readelf -d count
     shows "[libvg.so.0]"
     # shellcheck disable=SC2046,SC2086 # words
-    must ${CC:-cc} -Wall -std=c11 $sanitize $(flags --cflags) -o static count.c "$PWD/root/usr/lib/libvg.a" $(flags --static --libs)
+    must ${CC:-cc} -Wall -std=c11 $sanitize $(flags --cflags) -o static count.c "$PWD/root/usr/lib/libvg.a" \
+        $(flags --static --libs | sed 's/-lvg //')
     must env -u LD_LIBRARY_PATH ./static "$GOLDEN/times.vgs"
 
     # the examples in C, against the same by the programs
