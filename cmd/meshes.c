@@ -77,6 +77,7 @@ void report_mesh(report *r, const vg_head *h)
     report_put(r, "D", "D", report_number(vg_diagonal(h->body.reference, h->body.mesh.nv)));
     report_put(r, "reference", "reference", report_text(h->body.reference_name ? h->body.reference_name : ""));
     report_put(r, "texture_coordinates", a->ntex ? "texture coordinates" : NULL, report_count(a->ntex));
+    report_put(r, "colours", a->ncolours ? "colours" : NULL, report_count(a->ncolours));
     char asset[200];
     vg_asset_text(&h->body.asset, asset, sizeof asset);
     report_put(r, "asset", *asset ? "asset" : NULL, h->body.asset.n ? report_text(asset) : report_nothing());

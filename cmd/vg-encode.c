@@ -83,7 +83,7 @@ static void set_reference(vg_head *h, const char *operand)
         vg_head_merge_trace(h, &r, &e) < 0)
         cli_die(&e);
     vg_head_take(h, &r, "reference");
-    if (r.body.attributes.ntex || r.body.attributes.nlabels || r.body.asset.n) vg_head_take(h, &r, "attributes");
+    if (r.body.attributes.ntex || r.body.attributes.nlabels || r.body.attributes.ncolours || r.body.asset.n) vg_head_take(h, &r, "attributes");
     if (r.body.asset.n) vg_head_take(h, &r, "asset");
     vg_head_drop(h, "links");
     vg_head_drop(h, "rig");

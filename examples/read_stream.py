@@ -40,7 +40,7 @@ NETWORK_COUNTS = ("model", "direction", "mesh_digest", "data_digest", "vertices"
                   "hidden", "convolutions", "uncertain", "sets", "parameters", "seed", "frames", "iterations", "step", "windows",
                   "open", "phase", "best_iteration", "curve_length", "curve_block")
 NO_PARENT = 0xFFFFFFFF
-NEEDS = {**dict.fromkeys(("TEXC", "LABL", "ASST", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN", "NETW"), "MESH"), "SKIN": "RIG "}
+NEEDS = {**dict.fromkeys(("TEXC", "LABL", "COLV", "ASST", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN", "NETW"), "MESH"), "SKIN": "RIG "}
 TAG_BYTES = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
 
 
@@ -267,6 +267,7 @@ class Stream:
     mesh: object = None
     texture: object = None
     labels: object = None     # list of (face, kind name, text)
+    colours: object = None    # bytes: red, green, blue, opacity of each vertex
     asset: object = None      # (digest of the mesh, vertex of the mesh for each of the file, bytes)
     selection: object = None  # array, or None: all faces
     links: object = None      # array of pairs
@@ -717,6 +718,14 @@ class _Reader:
             p.fail("a label is of unknown kind")
         self.stream.labels = [(f, LABEL_KINDS[k], x) for f, k, x in zip(faces, kinds, texts)]
 
+    def colv(self, p: _Payload):
+        n = p.u64()
+        colours = bytes(p.u8s(4 * n))
+        p.end()
+        if n != self.stream.mesh.nv:
+            p.fail("it must have a colour for each vertex")
+        self.stream.colours = colours
+
     def asst(self, p: _Payload):
         n, digest, size = p.u64(), p.u64(), p.u64()
         vertex, data = p.u32s(n), bytes(p.u8s(size))
@@ -1148,7 +1157,7 @@ class _Reader:
             raise StreamError("the END mark's checksum is wrong: records were changed or moved")
         self.stream.tail, self.stream.checksum, self.done = self.pending, running, True
 
-    HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "ASST": asst, "SELE": sele, "LINK": link, "ANCH": anch,
+    HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "COLV": colv, "ASST": asst, "SELE": sele, "LINK": link, "ANCH": anch,
                 "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
                 "RIG ": rig, "SKIN": skin, "MAP ": map, "SIGN": sign, "NETW": netw, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
 
@@ -1227,6 +1236,7 @@ def to_json(s: Stream) -> dict:
         "texture": t and {"dim": t.dim, "coordinates": _rows(t.coordinates, t.dim),
                           "corners": [None if c == NO_TEXTURE else c for c in t.corners]},
         "labels": None if s.labels is None else [{"face": f, "kind": k, "text": x} for f, k, x in s.labels],
+        "colours": s.colours and _rows(list(s.colours), 4),
         "asset": s.asset and {"digest": f"{s.asset[0]:016x}", "vertex": list(s.asset[1]),
                               "data": s.asset[2].decode("latin-1")},
         "selection": None if s.selection is None else list(s.selection),

@@ -130,3 +130,55 @@ for line in open("reports"):
     assert worst < 1e-6, r
 END
 }
+
+@test "colours of vertices: PLY of all number types, OBJ, GLB; through filters; what has none names them" {
+    cat >c.ply <<'END'
+ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+property uchar red
+property uchar green
+property uchar blue
+property uchar alpha
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0 255 0 7 255
+1 0 0 0 1 2 128
+1 1 0 3 60 200 255
+0 1 0 nan 9 9 255
+4 0 1 2 3
+END
+    must vg-encode c.ply -o c.vgs
+    for format in ply-ascii ply ply-be obj glb gltf; do
+        must vg-decode --format $format c.vgs -o out.${format%%-*}
+        must vg-encode out.${format%%-*} -o $format.vgs
+    done
+    printf '%s\n' ply 'format ascii 1.0' 'element vertex 3' 'property float x' 'property float y' 'property float z' \
+        'property float red' 'property float green' 'property float blue' 'property ushort alpha' 'element face 1' \
+        'property list uchar int vertex_indices' end_header '0 0 0 1 0.5 0 65535' '1 0 0 2 -1 0.2 0' '0 1 0 0 0 1 257' \
+        '3 0 1 2' >float.ply
+    must vg-encode float.ply -o float.vgs
+    printf 'v 0 0 0\nv 1 0 0 1 0.5 0\nv 0 1 0 0 0 0 0.5\nv 1 1 0\nv 0 0 1 1\nf 1 2 3\n' >part.obj
+    must vg-encode part.obj -o part.vgs
+    must vg-decode --drop-loose part.obj -o drop.ply
+    must vg-encode drop.ply -o drop.vgs
+    pipe 'vg-encode --vectors c.ply | vg-solve -o solved.vgs'
+    must_warn vg-decode c.vgs -o out.off
+    says "not kept in 'out.off': colours of vertices"
+    py <<'END'
+import read_stream
+def colours(name):
+    s = read_stream.read_stream(name + ".vgs").colours
+    return [list(s[i:i + 4]) for i in range(0, len(s), 4)]
+want = [[255, 0, 7, 255], [0, 1, 2, 128], [3, 60, 200, 255], [0, 9, 9, 255]]
+for name in "c", "ply-ascii", "ply", "ply-be", "obj", "glb", "gltf", "solved":
+    assert colours(name) == want, (name, colours(name))
+assert colours("float") == [[255, 128, 0, 255], [255, 0, 51, 0], [0, 0, 255, 1]], colours("float")
+assert colours("part") == [[255] * 4, [255, 128, 0, 255], [0, 0, 0, 128], [255] * 4, [255] * 4], colours("part")
+assert colours("drop") == colours("part")[:3]
+END
+}

@@ -470,13 +470,14 @@ for name in "obj", "ply", "off", "stl", "glb", "gltf", "npz", "npy", "pc2", "mdd
     facts = {
         "texture": corners(a) == corners(b), "materials": names_of(a, "material") == names_of(b, "material"),
         "faces": a.mesh.faces() == b.mesh.faces(), "assets": a.asset is not None and b.asset is not None,
+        "colours": a.colours is not None and a.colours == b.colours,
         "names": [f.name for f in a.frames] == [f.name for f in b.frames],
         "times": [f.time for f in a.frames] == [f.time for f in b.frames]}
     for word, fact in facts.items():
-        if word in ("texture", "materials", "faces", "names") and beside or word in ("names", "times") and holds == "one pose":
+        if word in ("texture", "materials", "colours", "faces", "names") and beside or word in ("names", "times") and holds == "one pose":
             continue
         assert fact == (word in words.split(", ")), (name, word, fact, words)
         checked += 1
-assert checked > 35, checked
+assert checked > 40, checked
 END
 }

@@ -143,6 +143,10 @@ def labels(entries):
     return Record("LABL", u64(len(entries), *(x["face"] for x in entries)) + kinds + texts, 0)
 
 
+def colours(rows):
+    return Record("COLV", u64(len(rows)) + pad(bytes(flat(rows))), 0)
+
+
 def asset(a):
     data = a["data"].encode()
     counts = u64(len(a["vertex"]), int(a["digest"], 16), len(data))
@@ -290,6 +294,8 @@ def records_of(c):
         out.append(texture(c["texture"]))
     if c["labels"] is not None:
         out.append(labels(c["labels"]))
+    if c["colours"] is not None:
+        out.append(colours(c["colours"]))
     if c["asset"] is not None:
         out.append(asset(c["asset"]))
     for tag, value in (("SELE", c["selection"]), ("LINK", c["links"]), ("ANCH", c["anchors"])):
@@ -343,6 +349,7 @@ POINTS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1.5, 0.5, 0.25], [2, 0.5,
 BENT = [[0, 0, 0.5], [1, 0, 0], [1, 1, 0], [0, 1, 0.5], [1.5, 0.5, 0.75], [1.75, 0.5, 1.5]]
 
 
+COLOURS = [[255, 0, 0, 255], [0, 128, 0, 255], [0, 0, 1, 255], [7, 8, 9, 128]]
 ASSET = {"digest": "0123456789abcdef", "vertex": [0, 1, 2, 3, 2], "data": "not a GLB! "}
 
 
@@ -350,7 +357,7 @@ def content(**changes):
     """A stream of vertices, as small as it gets: a mesh of two triangles, one frame. With `changes`."""
     c = {
         "minor": 0, "provenance": [], "mesh": {"vertices": 4, "faces": [[0, 1, 2], [0, 2, 3]]}, "texture": None,
-        "labels": None, "asset": None, "selection": None, "links": None, "anchors": None,
+        "labels": None, "colours": None, "asset": None, "selection": None, "links": None, "anchors": None,
         "reference": {"name": "rest", "positions": POINTS[:4]}, "skeleton": None, "correspondence": None,
         "patches": None, "rig": None, "map": None, "signal": None, "network": None,
         "kind": "vertices", "precision": 8, "count": 4, "extra": [],
@@ -585,6 +592,7 @@ def golden():
                     frames=[pose("t", [[1, 0, 0, 0, 0, 0, 0], [0.5, 0.5, -0.5, 0.5, 1, 2, 3]], time=-1.5)])),
         "skeleton": ("the joints of a skeleton, whose bones are the mesh's faces", skeleton_content()),
         "correspondence": ("three faces of a target driven by two faces of a source", register_content()),
+        "colours": ("a colour for each vertex, one of which is half transparent", content(colours=COLOURS)),
         "asset": ("two vertices of a file for one of the mesh, and 11 bytes that only writers of such files know",
                   content(asset=ASSET)),
         "patches": ("three faces in two patches", mixed(patches={"count": 2, "of_face": [1, 0, 1]})),
@@ -988,6 +996,12 @@ def reject_attachments():
         "skel-name-utf8": patched(s, "SKEL", 168, b"\xff"),
         "skel-padding": patched(skeleton_content(), "SKEL", -1, b"\1"),
         "skel-cut": lie(s, "SKEL", payload=lambda record: record.payload[:-8]),
+        "colv-cut": lie(content(colours=COLOURS), "COLV", payload=lambda record: record.payload[:-8]),
+        "colv-long": lie(content(colours=COLOURS), "COLV", payload=lambda record: record.payload + bytes(8)),
+        "colv-few": whole(content(colours=COLOURS[:3])),
+        "colv-count-2-62": patched(content(colours=COLOURS), "COLV", 0, u64(1 << 62)),
+        "colv-padding": patched(content(colours=COLOURS[:3]), "COLV", -1, b"\1"),
+        "colv-before-mesh": whole(content(), [colours(COLOURS)] + records_of(content())),
         "asst-cut": lie(content(asset=ASSET), "ASST", payload=lambda record: record.payload[:-8]),
         "asst-long": lie(content(asset=ASSET), "ASST", payload=lambda record: record.payload + bytes(8)),
         "asst-empty": whole(content(asset=dict(ASSET, vertex=[]))),

@@ -162,18 +162,30 @@ EOF
         '0 0 0 0 0 1 0 0 255 0 0' '1 0 0 0 0 1 1 0 255 0 0' '0 1 0 0 0 1 0 1 255 0 0' '3 0 1 2' >blender.ply
     geometry blender.ply
     [ "$output" = $'0 0 0\n1 0 0\n0 1 0\n3 0 1 2' ] || fail "$output"
-    must_warn vg-encode blender.ply -o out.vgs
+    ply_ascii 3 'property uchar red' 'property float green' 'property ushort blue' 'element face 1' \
+        'property list uchar int vertex_indices' end_header '0 0 0 300 0.5 65535' '1 0 0 red nan 0' '1 1 0 7 -1 257' '3 0 1 2' >channels.ply
+    must_warn vg-encode channels.ply -o out.vgs
     one_line
-    says "left out the colours of its vertices"
+    says "left out 4 channels of colours that are out of their range"
+    must vg-decode out.vgs -o out.obj
+    [ "$(grep '^v ' out.obj)" = $'v 0 0 0 0 0.5019608 1\nv 1 0 0 0 0 0\nv 1 1 0 0.02745098 0 0.003921569' ] || fail "$(cat out.obj)"
+    ply_ascii 3 'property uchar red' 'property uchar blue' 'element face 1' 'property list uchar int vertex_indices' end_header \
+        '0 0 0 1 2' '1 0 0 1 2' '1 1 0 1 2' '3 0 1 2' >two.ply
+    must_warn vg-encode two.ply -o out.vgs
+    says "left out colours of vertices without red, green and blue"
 }
 
-@test "OBJ: colours behind the coordinates of vertices are left out with a word, a fourth coordinate without" {
+@test "OBJ: colours behind the coordinates of vertices are kept, a bad one loses itself, a fourth coordinate is passed over" {
     printf 'v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 1 2 3\n' >colours.obj
-    must_warn vg-encode colours.obj -o out.vgs
+    must vg-encode colours.obj -o out.vgs
+    must vg-decode out.vgs -o out.obj
+    cmp colours.obj out.obj
+    printf 'v 0 0 0 1 0 nan\nv 1 0 0 1 0 0\nv 0 1 0 0 255 0\nv 0 1 1 0 0 0 0 0\nf 1 2 3 4\n' >bad.obj
+    must_warn vg-encode bad.obj -o out.vgs
     one_line
-    says "left out the colours of its vertices"
-    geometry colours.obj
-    [ "$(tail -1 <<<"$output")" = '3 0 1 2' ] || fail "$output"
+    says "left out 3 colours of vertices that are not numbers from 0 to 1"
+    must vg-decode out.vgs -o out.obj
+    [ "$(grep '^v ' out.obj)" = $'v 0 0 0 1 1 1\nv 1 0 0 1 0 0\nv 0 1 0 1 1 1\nv 0 1 1 1 1 1' ] || fail "$(cat out.obj)"
     printf 'v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n' >weights.obj
     must vg-encode weights.obj -o out.vgs
 }

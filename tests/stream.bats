@@ -38,7 +38,7 @@ END
 
 @test "a stream that is passed through comes out as it was" {
     for name in smallest f32 times empty-sequence every-header-record vectors vectors-selected-f32 pins scalars deformations transforms \
-        features coordinates unknown-form skeleton correspondence patches map turns rig asset; do
+        features coordinates unknown-form skeleton correspondence patches map turns rig colours asset; do
         must vg-encode --no-provenance "$GOLDEN/$name.vgs" -o "$name.vgs"
         same_file "$GOLDEN/$name.vgs" "$name.vgs"
     done

@@ -11,7 +11,7 @@
 
 const MAGIC = [0x89, 0x56, 0x47, 0x53, 0x0d, 0x0a, 0x1a, 0x31];
 const CRITICAL = 1, COPY_SAFE = 2;
-const PLAIN = ['TEXC', 'LABL', 'ASST', 'SKEL', 'PTCH', 'RIG ', 'SKIN'];
+const PLAIN = ['TEXC', 'LABL', 'COLV', 'ASST', 'SKEL', 'PTCH', 'RIG ', 'SKIN'];
 const KNOWN = new Set([...PLAIN, 'PROV', 'MESH', 'SELE', 'LINK', 'ANCH', 'REFP', 'CORR', 'MAP ', 'SIGN', 'NETW', 'FORM', 'FRAM', 'FAIL', 'END ']);
 const flagsOf = (tag) => (tag === 'PROV' ? COPY_SAFE : PLAIN.includes(tag) ? 0 : CRITICAL);
 const pad = (n) => (8 - (n % 8)) % 8;

@@ -38,7 +38,7 @@ except ImportError:
 
 MAGIC = b"\x89VGS\r\n\x1a1"
 CRITICAL, COPY_SAFE = 1, 2
-FLAGS = {"PROV": COPY_SAFE, **dict.fromkeys(("TEXC", "LABL", "ASST", "SKEL", "PTCH", "RIG ", "SKIN"), 0)}  # of known tags; else CRITICAL
+FLAGS = {"PROV": COPY_SAFE, **dict.fromkeys(("TEXC", "LABL", "COLV", "ASST", "SKEL", "PTCH", "RIG ", "SKIN"), 0)}  # of known tags; else CRITICAL
 KNOWN = set(FLAGS) | {"MESH", "SELE", "LINK", "ANCH", "REFP", "CORR", "MAP ", "SIGN", "NETW", "FORM", "FRAM", "FAIL", "END "}
 MOST_BYTES = 1 << 40
 

@@ -48,7 +48,6 @@ void vg_asset_text(const vg_asset *a, char *to, size_t room)
         say_count(to, room, count_items(&g, "images"), "texture");
         if (having(&g, "NORMAL")) append_text(to, room, "normals");
         if (having(&g, "TANGENT")) append_text(to, room, "tangents");
-        if (having(&g, "COLOR_0")) append_text(to, room, "colours of vertices");
         if (having(&g, "TEXCOORD_1")) append_text(to, room, "further texture coordinates");
         say_count(to, room, count_items(&g, "skins"), "skin");
         say_count(to, room, count_items(&g, "cameras"), "camera");

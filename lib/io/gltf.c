@@ -486,7 +486,7 @@ static int begin_gltf(void **state, const vg_head *h, const vg_sink_options *o, 
 }
 
 /* Labels, and texture coordinates of vertices: the writer reports itself what it drops. */
-enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS | VGI_KEEPS_NAMES |
+enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_COLOURS | VGI_KEEPS_LABELS | VGI_KEEPS_NAMES |
                VGI_KEEPS_TIMES | VGI_KEEPS_ASSET };
 
 enum { KINDS = 1 << VG_VERTICES | 1 << VG_TRANSFORMS }; /* transforms: of a rig */

@@ -314,7 +314,7 @@ static bool has_more(const vgi_gltf_scene *x, const vg_mesh *mesh)
     for (size_t i = 0; i < x->nparts; i++)
         for (const char *key = vgi_json_key(x->parts[i].attributes, NULL); key;
              key = vgi_json_key(x->parts[i].attributes, key))
-            if (strcmp(key, "POSITION") && strcmp(key, "TEXCOORD_0") && !(plain && !strcmp(key, "NORMAL"))) return true;
+            if (strcmp(key, "POSITION") && strcmp(key, "TEXCOORD_0") && !(plain && (!strcmp(key, "NORMAL") || !strcmp(key, "COLOR_0")))) return true;
     return false;
 }
 

@@ -230,7 +230,7 @@ static int say_primitives(vgi_gltf_writing *w, vg_err *e)
     vg_bytes moving = {0};
     int r = vgi_gltf_say(&moving, e, "\"attributes\":{\"POSITION\":%zu", x->lists[0].position);
     if (r == VG_OK && w->normals.n) r = vgi_gltf_say(&moving, e, ",\"NORMAL\":%zu", x->lists[0].normal);
-    if (r == VG_OK && w->seams.uv) r = vgi_gltf_say(&moving, e, ",\"TEXCOORD_0\":%zu", w->texture);
+    if (r == VG_OK) r = vgi_gltf_say_attributes(w, &moving, e);
     if (r == VG_OK) r = vgi_gltf_say(&moving, e, "}");
     for (size_t t = 0; t < x->targets && r == VG_OK; t++) {
         r = vgi_gltf_say(&moving, e, "%s{\"POSITION\":%zu", t ? "," : ",\"targets\":[",

@@ -315,7 +315,7 @@ static int say_mesh(vgi_gltf_writing *w, vg_err *e)
     int r = vgi_gltf_say(&moving, e, "\"attributes\":{\"POSITION\":%zu,\"JOINTS_0\":%zu,\"WEIGHTS_0\":%zu", x->points,
                          x->joints, x->weights);
     if (r == VG_OK && w->normals.n) r = vgi_gltf_say(&moving, e, ",\"NORMAL\":%zu", x->normals);
-    if (r == VG_OK && w->seams.uv) r = vgi_gltf_say(&moving, e, ",\"TEXCOORD_0\":%zu", w->texture);
+    if (r == VG_OK) r = vgi_gltf_say_attributes(w, &moving, e);
     if (r == VG_OK) r = vgi_gltf_say(&moving, e, "}");
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "\"meshes\":[{");
     if (r == VG_OK) r = vgi_gltf_say_mesh_name(w, e);

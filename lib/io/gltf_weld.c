@@ -2,6 +2,7 @@
  * vertices are merged. Vertices and faces come from gltf_scene.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
+#include "model/colour.h"
 #include "io/polygon.h"
 
 #include <stdlib.h>
@@ -379,6 +380,40 @@ static int take_uv(vgi_gltf_scene *x, const vg_mesh *m, vg_err *e)
     return VG_OK;
 }
 
+static int begin_colours(vg_attributes *a, size_t n, vg_err *e)
+{
+    if (!(a->colours = vgi_array_raw(n, 4, e))) return VG_ENOMEM;
+    a->ncolours = n;
+    memset(a->colours, 255, 4 * n);
+    return VG_OK;
+}
+
+/* Of vertices of the file that are one vertex of the mesh, the first one gives the colour. */
+static int take_colours(vgi_gltf_scene *x, size_t n, vg_err *e)
+{
+    vg_attributes *a = &x->attributes;
+    int r = VG_OK;
+    for (size_t i = x->nparts; i-- > 0 && r == VG_OK;) {
+        const vgi_gltf_part *p = &x->parts[i];
+        const vgi_json *ref = vgi_json_get(p->attributes, "COLOR_0");
+        vgi_accessor c;
+        if (!ref || (vgi_gltf_accessor(&x->g, ref, 4, p->count, "colours", &c, NULL) < 0 &&
+                     vgi_gltf_accessor(&x->g, ref, 3, p->count, "colours", &c, NULL) < 0))
+            continue;
+        if (!a->ncolours && (r = begin_colours(a, n, e)) < 0) break;
+        for (size_t v = p->count; v-- > 0;) {
+            double rgba[4] = {0, 0, 0, 1};
+            const size_t number = x->number[p->first + v];
+            uint8_t *to = a->colours + 4 * number;
+            if (number >= n) continue;
+            vgi_accessor_get(&c, v, rgba);
+            for (int k = 0; k < 3; k++) to[k] = vgi_srgb_of_linear(rgba[k]);
+            to[3] = vgi_byte_of(rgba[3]);
+        }
+    }
+    return r;
+}
+
 static int weld_parts(vgi_gltf_scene *x, const welding *k, size_t *n, vg_err *e)
 {
     int r = VG_OK;
@@ -404,6 +439,7 @@ static int weld_vertices(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
     }
     if (r == VG_OK) r = take_uv(x, m, e);
     if (r == VG_OK) x->dropped = renumber_faces(x, m, k.number, x->attributes.corner_tex);
+    if (r == VG_OK) r = take_colours(x, n, e);
     m->nv = n;
     free(k.slots);
     return r;

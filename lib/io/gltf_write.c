@@ -5,11 +5,14 @@
  * The frames wait in an unnamed file.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
+#include "model/colour.h"
 
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <unistd.h>
+
+enum { COLOUR = 8 }; /* bytes */
 
 
 /* ---- supported input ---- */
@@ -250,6 +253,47 @@ static int describe_texture(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->seams.n, "VEC2", NULL, 0, e);
 }
 
+static bool has_colours(const vgi_gltf_writing *w)
+{
+    return !w->character && w->h->body.attributes.ncolours;
+}
+
+/* Whole numbers of 16 bits: linear light, which 8 bits would not tell apart where it is dark. */
+static int describe_colours(vgi_gltf_writing *w, vg_err *e)
+{
+    w->colours = w->naccessors;
+    if (!has_colours(w)) return VG_OK;
+    int r = vgi_gltf_view(w, COLOUR * w->seams.n, ",\"target\":34962", e);
+    if (r == VG_OK)
+        r = vgi_gltf_say(&w->accessors, e,
+                         "%s{\"bufferView\":%zu,\"componentType\":%d,\"normalized\":true,\"count\":%zu,\"type\":\"VEC4\"}",
+                         w->naccessors ? ",\n" : "", w->nviews - 1, VGI_GLTF_USHORT, w->seams.n);
+    w->naccessors++;
+    return r;
+}
+
+int vgi_gltf_say_attributes(vgi_gltf_writing *w, vg_bytes *to, vg_err *e)
+{
+    int r = w->seams.uv ? vgi_gltf_say(to, e, ",\"TEXCOORD_0\":%zu", w->texture) : VG_OK;
+    return r == VG_OK && has_colours(w) ? vgi_gltf_say(to, e, ",\"COLOR_0\":%zu", w->colours) : r;
+}
+
+static int emit_colours(vgi_gltf_writing *w, vg_err *e)
+{
+    const uint8_t *colours = w->h->body.attributes.colours;
+    int r = VG_OK;
+    for (size_t v = 0; v < w->seams.n && r == VG_OK; v++) {
+        const uint8_t *c = colours + 4 * (v < w->seams.nv ? v : (size_t)w->seams.from[v]);
+        unsigned char packed[COLOUR];
+        for (int k = 0; k < 4; k++) {
+            const long x = lrint(65535 * (k < 3 ? vgi_linear_of_srgb(c[k]) : c[k] / 255.0));
+            packed[2 * k] = (unsigned char)x, packed[2 * k + 1] = (unsigned char)(x >> 8);
+        }
+        r = vgi_gltf_emit(w, packed, COLOUR, e);
+    }
+    return r;
+}
+
 /* Items of the character's file keep their numbers. */
 static int describe_character(vgi_gltf_writing *w, vg_err *e)
 {
@@ -265,6 +309,7 @@ static int describe_file(vgi_gltf_writing *w, vg_err *e)
     if (r == VG_OK && !w->character) r = describe_indices(w, false, &w->triangles, e);
     if (r == VG_OK) r = describe_indices(w, true, &w->lines, e);
     if (r == VG_OK) r = describe_texture(w, e);
+    if (r == VG_OK) r = describe_colours(w, e);
     if (r == VG_OK && !w->still) r = vgi_gltf_describe_times(w, e);
     return r < 0 ? r : w->manner->describe(w, e);
 }
@@ -350,6 +395,7 @@ static int emit_all(vgi_gltf_writing *w, vg_err *e)
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.triangles.data, w->shape.triangles.size, e);
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.lines.data, w->shape.lines.size, e);
     if (r == VG_OK && w->seams.uv) r = vgi_gltf_emit_singles(w, w->seams.uv, 2 * w->seams.n, e);
+    if (r == VG_OK && has_colours(w)) r = emit_colours(w, e);
     if (r == VG_OK && !w->still) r = vgi_gltf_emit_times(w, e);
     return r < 0 ? r : w->manner->emit(w, e);
 }

@@ -83,7 +83,7 @@ struct vgi_gltf_writing {
     vgi_gltf_shape shape;
     vg_bytes json, views, accessors; /* text */
     size_t nviews, naccessors, bytes;
-    size_t triangles, lines, texture; /* numbers of their accessors; empty ones have none */
+    size_t triangles, lines, texture, colours; /* numbers of their accessors; empty ones have none */
     unsigned char carry[3];    /* base64: bytes of an incomplete group of three */
     size_t ncarry;
     char warning[400], report[200];
@@ -149,6 +149,8 @@ int vgi_gltf_say_take_name(vgi_gltf_writing *w, const vgi_gltf_take *t, vg_err *
 int vgi_gltf_say_primitives(vgi_gltf_writing *w, const vg_bytes *moving, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_say_seams: originals of the copies, for extras, with a leading comma; nothing without copies. */
 int vgi_gltf_say_seams(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_say_attributes: of a mesh that is no character: texture coordinates and colours, a comma in front of each. */
+int vgi_gltf_say_attributes(vgi_gltf_writing *w, vg_bytes *to, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_view: a view of the next bytes of the buffer; more: additional JSON. */
 int vgi_gltf_view(vgi_gltf_writing *w, size_t bytes, const char *more, vg_err *e) VG_MUST_CHECK;

@@ -142,6 +142,7 @@ enum { /* what a format keeps of a sequence besides positions; the program warns
     VGI_KEEPS_TIMES = 64,   /* of frames, any; a format that keeps some of them says so in warning() */
     VGI_KEEPS_SKELETON = 128,
     VGI_KEEPS_DOUBLES = 256, /* with full precision; otherwise doubles are refused */
+    VGI_KEEPS_COLOURS = 1024, /* of vertices */
     VGI_KEEPS_ASSET = 512    /* materials, normals, skins; a format that keeps some of them says so in warning() */
 };
 

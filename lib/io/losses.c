@@ -43,6 +43,7 @@ int vgi_losses_list(const vgi_losses *x, vg_bytes *line, vg_err *e)
                {!(keeps & VGI_KEEPS_ORDER), "the numbers of the vertices, and those in no face"},
                {!(keeps & VGI_KEEPS_TEXTURE) && b->attributes.ntex, "texture coordinates"},
                {!(keeps & VGI_KEEPS_LABELS) && b->attributes.nlabels, "groups and materials"},
+               {!(keeps & VGI_KEEPS_COLOURS) && b->attributes.ncolours, "colours of vertices"},
                {!(keeps & VGI_KEEPS_ASSET) && *asset && !(keeps & VGI_KEEPS_LABELS && names_library(b)), asset},
                {!(keeps & VGI_KEEPS_SKELETON) && b->skeleton.njoints, "the skeleton"},
                {!(keeps & VGI_KEEPS_NAMES) && x->names, "the names of the frames"},

@@ -1,8 +1,9 @@
-/* obj.c: reads Wavefront OBJ: vertices, texture coordinates, faces, lines, and the names of groups and materials.
- * Normals (they change with the pose), vertex colours, points and free-form surfaces are ignored; material files are
+/* obj.c: reads Wavefront OBJ: vertices and their colours, texture coordinates, faces, lines, and the names of groups and materials.
+ * Normals (they change with the pose), points and free-form surfaces are ignored; material files are
  * read in mtl.c. Writing is in obj_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "model/colour.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,13 +17,13 @@ struct reading {
     const char *subject;
     vg_err *e;
     vg_model *m;
-    size_t vertices_cap, start_cap, vert_cap, tex_cap, labels_cap;
+    size_t vertices_cap, start_cap, vert_cap, tex_cap, labels_cap, colours_cap;
     size_t corners;
     bool textured;      /* corner_tex exists, with capacity vert_cap */
     size_t sought_face; /* find_face: stop after this face ... */
     const char *found;  /* ... and store the position of its statement */
     size_t bad_tex;     /* number of malformed texture coordinates */
-    bool coloured;      /* vertices have colours, which are left out */
+    size_t bad_colours; /* number of malformed colours of vertices */
 };
 
 static size_t line_of(const struct reading *in, const char *p)
@@ -161,6 +162,50 @@ static inline const char *read_coordinate(struct reading *in, const char *p, dou
     return NULL;
 }
 
+/* Three or four numbers from 0 to 1 at p, and nothing else, into rgba. */
+static bool take_colour(const struct reading *in, const char *p, double rgba[4])
+{
+    for (int n = 0;; n++) {
+        const char *word = skip_blanks(in, p);
+        if (at_end(in, word)) return n >= 3;
+        const char *next = word > p && n < 4 ? vgi_parse_double(word, in->end, &rgba[n]) : NULL;
+        if (!next || !ends_word(in, next) || !(rgba[n] >= 0 && rgba[n] <= 1)) return false;
+        p = next;
+    }
+}
+
+/* The words behind the coordinates of the last vertex: one is a weight, three or four are the vertex's colour. Vertices
+ * without a colour, or with a malformed one, are white. */
+static int read_colour(struct reading *in, const char *p)
+{
+    vg_attributes *a = &in->m->attributes;
+    double x[4] = {0, 0, 0, 1};
+    size_t n;
+    count_words(in, p, &n);
+    if (n < 3) return VG_OK;
+    if (!take_colour(in, p, x)) {
+        in->bad_colours++;
+        return VG_OK;
+    }
+    if (vgi_grow(&a->colours, &in->colours_cap, in->m->mesh.nv, 4, in->e) < 0) return VG_ENOMEM;
+    memset(a->colours + 4 * a->ncolours, 255, 4 * (in->m->mesh.nv - a->ncolours));
+    a->ncolours = in->m->mesh.nv;
+    for (int k = 0; k < 4; k++) a->colours[4 * (a->ncolours - 1) + (size_t)k] = vgi_byte_of(x[k]);
+    return VG_OK;
+}
+
+/* Vertices behind the last one with a colour are white. */
+static int finish_colours(struct reading *in)
+{
+    vg_attributes *a = &in->m->attributes;
+    const size_t nv = in->m->mesh.nv;
+    if (!a->ncolours || a->ncolours == nv) return VG_OK;
+    if (vgi_grow(&a->colours, &in->colours_cap, nv, 4, in->e) < 0) return VG_ENOMEM;
+    memset(a->colours + 4 * a->ncolours, 255, 4 * (nv - a->ncolours));
+    a->ncolours = nv;
+    return VG_OK;
+}
+
 static const char *read_vertex(struct reading *in, const char *p)
 {
     vg_model *m = in->m;
@@ -181,11 +226,8 @@ static const char *read_vertex(struct reading *in, const char *p)
         }
         p = read_coordinate(in, p, to + k);
     }
-    if (!p) return NULL;
-    size_t more;
-    p = count_words(in, p, &more);
-    in->coloured |= more >= 3; /* x y z, perhaps w, r g b */
-    return p;
+    if (p && !at_end(in, skip_blanks(in, p)) && read_colour(in, p) < 0) return NULL;
+    return p ? skip_words(in, p) : NULL;
 }
 
 /* One to three finite numbers and nothing else; returns their number, or 0. */
@@ -560,8 +602,10 @@ int vgi_obj_read(vg_model *m, const char *data, size_t n, const char *subject, v
     int r = read_statements(&in);
     if (r < 0) return r;
     if (m->mesh.nv == 0) return vg_fail(e, VG_EINPUT, "%s has no vertices (no line 'v x y z')", subject);
-    if (in.coloured) vgi_note(&m->note, "left out the colours of its vertices");
+    if (in.bad_colours)
+        vgi_note(&m->note, "left out %zu colours of vertices that are not numbers from 0 to 1", in.bad_colours);
     r = check_vertices(&in);
+    if (r == VG_OK) r = finish_colours(&in);
     return r == VG_OK ? finish_tex(&in) : r;
 }
 
@@ -599,5 +643,5 @@ static bool sniff_obj(const unsigned char *data, size_t n)
 }
 
 const vgi_format vgi_format_obj = {"obj", ".obj", sniff_obj, read_obj, vgi_obj_write, vgi_obj_rest,
-                                     VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE |
+                                     VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_COLOURS |
                                          VGI_KEEPS_LABELS | VGI_KEEPS_DOUBLES};

@@ -53,6 +53,29 @@ static int write_numbers(vg_bytes *out, const char *word, const double *x, size_
     return VG_OK;
 }
 
+/* "v x y z r g b", colours from 0 to 1, and the opacity if it is not 1. */
+static int write_coloured(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    const uint8_t *colour = w->attributes->colours;
+    for (size_t v = 0; v < w->mesh->nv; v++, colour += 4) {
+        if (vgi_bytes_reserve(out, out->size + 7 * MOST_NUMBER + 2, e) < 0) return VG_ENOMEM;
+        char *to = (char *)out->data + out->size;
+        *to++ = 'v';
+        for (size_t k = 0; k < 3; k++) {
+            const double x = w->vertices[3 * v + k];
+            *to++ = ' ';
+            to += w->full_precision ? vgi_print_double(to, x) : vgi_print_float(to, x);
+        }
+        for (size_t k = 0; k < (colour[3] == 255 ? 3u : 4u); k++) {
+            *to++ = ' ';
+            to += vgi_print_float(to, colour[k] / 255.0);
+        }
+        *to++ = '\n';
+        out->size = (size_t)(to - (char *)out->data);
+    }
+    return VG_OK;
+}
+
 static int write_face(vg_bytes *out, const uint32_t *vert, const uint32_t *tex, size_t n, vg_err *e)
 {
     if (vgi_bytes_reserve(out, out->size + n * MOST_REFERENCE + 2, e) < 0) return VG_ENOMEM;
@@ -99,7 +122,8 @@ static const vg_attributes *attributes_of(const vgi_writing *w)
 int vgi_obj_write(vg_bytes *out, const vgi_writing *w, vg_err *e)
 {
     int r = write_libraries(out, attributes_of(w), e);
-    return r < 0 ? r : write_numbers(out, "v", w->vertices, w->mesh->nv, 3, w->full_precision, e);
+    if (r < 0 || attributes_of(w)->ncolours) return r < 0 ? r : write_coloured(out, w, e);
+    return write_numbers(out, "v", w->vertices, w->mesh->nv, 3, w->full_precision, e);
 }
 
 int vgi_obj_rest(vg_bytes *out, const vgi_writing *w, vg_err *e)

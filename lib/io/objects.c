@@ -121,6 +121,7 @@ static int take_objects(reading *x, vg_head *h, const char *subject, vg_err *e)
     if (r < 0) return r;
     m->mesh.nf /= x->frames;
     m->mesh.nv /= x->frames;
+    if (m->attributes.ncolours) m->attributes.ncolours = m->mesh.nv;
     cut_attributes(&m->attributes, m->mesh.nf, m->mesh.start[m->mesh.nf]);
     r = vgi_mend_faces(&m->mesh, m->vertices, &m->attributes, &m->note, subject, e);
     h->kind = VG_VERTICES;
@@ -177,7 +178,7 @@ static void close_objects(void *state)
 const vgi_sequence_format vgi_sequence_objects = {
     .name = "obj",
     .suffix = ".obj",
-    .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS | VGI_KEEPS_NAMES,
+    .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_COLOURS | VGI_KEEPS_LABELS | VGI_KEEPS_NAMES,
     .open = open_objects,
     .next = next_object,
     .frames = frames_of,

@@ -1,7 +1,8 @@
-/* ply.c: reads PLY polygon files, text and binary in both byte orders: vertices, faces, triangle strips, edges. All
- * other elements and properties (colours, normals, user data) are skipped. Writing is in ply_write.c.
+/* ply.c: reads PLY polygon files, text and binary in both byte orders: vertices and their colours, faces, triangle
+ * strips, edges. All other elements and properties (normals, user data) are skipped. Writing is in ply_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "model/colour.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,8 +12,8 @@ enum { MOST_WORDS = 6, SHOWN = 40 }; /* words per header line; bytes of the inpu
 enum type { NO_TYPE, I8, U8, I16, U16, I32, U32, F32, F64 };
 static const unsigned char type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 
-/* The properties that are read. X, Y, Z in this order. */
-enum role { PASSED_OVER, X, Y, Z, INDICES, FROM, TO };
+/* The properties that are read. X, Y, Z and RED, GREEN, BLUE, ALPHA in this order. */
+enum role { PASSED_OVER, X, Y, Z, RED, GREEN, BLUE, ALPHA, INDICES, FROM, TO };
 enum kind { OTHER, VERTEX, FACE, EDGE, STRIPS };
 
 struct property {
@@ -40,7 +41,8 @@ struct reading {
     struct property *properties;
     size_t nproperties, properties_cap;
     size_t start_cap, vert_cap, corners;
-    bool has_vertices, coloured; /* coloured: its vertices have colours, which are left out */
+    bool has_vertices;
+    size_t bad_colours; /* number of channels out of their range */
 };
 
 struct word {
@@ -132,6 +134,13 @@ static enum role role_named(enum kind kind, struct word name, bool list)
     } roles[] = {{VERTEX, false, "x", X},
                  {VERTEX, false, "y", Y},
                  {VERTEX, false, "z", Z},
+                 {VERTEX, false, "red", RED},
+                 {VERTEX, false, "green", GREEN},
+                 {VERTEX, false, "blue", BLUE},
+                 {VERTEX, false, "alpha", ALPHA},
+                 {VERTEX, false, "diffuse_red", RED},
+                 {VERTEX, false, "diffuse_green", GREEN},
+                 {VERTEX, false, "diffuse_blue", BLUE},
                  {FACE, true, "vertex_indices", INDICES},
                  {FACE, true, "vertex_index", INDICES},
                  {STRIPS, true, "vertex_indices", INDICES},
@@ -158,11 +167,11 @@ static int read_property_line(struct reading *in, const struct word *words, size
         return vg_fail(in->e, VG_EINPUT, "%s: the PLY header has a property before any element", in->subject);
     struct word type = words[list ? 3 : 1], name = words[list ? 4 : 2];
     struct element *el = &in->elements[in->nelements - 1];
-    if (el->kind == VERTEX && word_is(name, "red")) in->coloured = true;
     struct property p = {list ? type_named(words[2]) : NO_TYPE, type_named(type), role_named(el->kind, name, list)};
     if (p.item == NO_TYPE || (list && p.count == NO_TYPE))
         return vg_fail(in->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", in->subject, shown_length(name),
                        name.at);
+    if (p.role >= RED && p.role <= ALPHA && has_role(in, el, p.role)) p.role = PASSED_OVER;
     if (p.role && has_role(in, el, p.role))
         return vg_fail(in->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", in->subject, el->name, shown_length(name),
                        name.at);
@@ -215,7 +224,6 @@ static int read_header(struct reading *in)
         if (r < 0) return r;
     }
     if (strange) vgi_note(&in->m->note, "left out %zu meaningless lines of the PLY header", strange);
-    if (in->coloured) vgi_note(&in->m->note, "left out the colours of its vertices");
     if (!formatted) return vg_fail(in->e, VG_EINPUT, "%s: the PLY header has no format line", in->subject);
     for (size_t i = 0; i < in->nelements; i++) {
         int r = finish_element(in, &in->elements[i]);
@@ -471,12 +479,41 @@ static int read_edge(struct reading *in, const struct element *el, uint64_t i)
     return end_face(in);
 }
 
+/* A channel of a colour as a byte: integers of 8 and 16 bits span their type, those of 32 bits 0 to 255, binary32 and
+ * binary64 0 to 1. One that is out of that range or no number becomes black, or opaque. */
+static void put_colour(struct reading *in, const struct property *p, uint64_t i, double x)
+{
+    uint8_t *to = in->m->attributes.colours + 4 * i + (p->role - RED);
+    if (p->item >= F32) x *= 255;
+    else if (p->item == I16 || p->item == U16) x /= 257;
+    if (x >= 0 && x <= 255.5) *to = vgi_byte_of(x / 255);
+    else in->bad_colours++;
+}
+
+static int read_colour(struct reading *in, const struct property *p, const struct element *el, uint64_t i)
+{
+    double x = NAN;
+    struct word w;
+    if (!in->text) {
+        int r = read_number(in, p->item, el, i, &x);
+        if (r < 0) return r;
+    } else if (!next_word(in, &w)) {
+        return fail_word(in, el, i, (struct word){0});
+    } else if (vgi_parse_double(w.at, w.at + w.n, &x) != w.at + w.n) {
+        x = NAN;
+    }
+    put_colour(in, p, i, x);
+    return VG_OK;
+}
+
 static int read_vertex(struct reading *in, const struct element *el, uint64_t i)
 {
     double *to = in->m->vertices + 3 * i;
     for (size_t k = 0; k < el->n; k++) {
         const struct property *p = &in->properties[el->first + k];
-        int r = p->role ? read_number(in, p->item, el, i, to + (p->role - X)) : skip_property(in, p, el, i);
+        int r = p->role == PASSED_OVER || (p->role >= RED && !in->m->attributes.ncolours) ? skip_property(in, p, el, i)
+                     : p->role >= RED ? read_colour(in, p, el, i)
+                                      : read_number(in, p->item, el, i, to + (p->role - X));
         if (r < 0) return r;
     }
     if (isfinite(to[0]) && isfinite(to[1]) && isfinite(to[2])) return VG_OK;
@@ -492,6 +529,11 @@ static int read_other(struct reading *in, const struct element *el, uint64_t i)
     return VG_OK;
 }
 
+static void read_fixed_colours(struct reading *r, const struct element *el, const struct property *p, size_t at)
+{
+    for (uint64_t i = 0; i < el->count; i++) put_colour(r, p, i, number_at(r->p + i * el->least + at, p->item, r->swap));
+}
+
 /* Binary vertices of fixed size: their positions are known, so the loop needs no checks. */
 static void read_fixed_vertices(struct reading *in, const struct element *el)
 {
@@ -499,7 +541,8 @@ static void read_fixed_vertices(struct reading *in, const struct element *el)
     enum type type[3] = {F32, F32, F32};
     for (size_t k = 0; k < el->n; k++) {
         const struct property *p = &in->properties[el->first + k];
-        if (p->role) offset[p->role - X] = at, type[p->role - X] = p->item;
+        if (p->role >= X && p->role <= Z) offset[p->role - X] = at, type[p->role - X] = p->item;
+        if (p->role >= RED && p->role <= ALPHA && in->m->attributes.ncolours) read_fixed_colours(in, el, p, at);
         at += type_bytes[p->item];
     }
     double *to = in->m->vertices;
@@ -509,12 +552,26 @@ static void read_fixed_vertices(struct reading *in, const struct element *el)
     in->p = p;
 }
 
+/* Colours start as opaque black. */
+static int begin_colours(struct reading *in, const struct element *el)
+{
+    vg_attributes *a = &in->m->attributes;
+    const int channels = has_role(in, el, RED) + has_role(in, el, GREEN) + has_role(in, el, BLUE);
+    if (channels > 0 && channels < 3) vgi_note(&in->m->note, "left out colours of vertices without red, green and blue");
+    if (channels < 3) return VG_OK;
+    if (!(a->colours = vgi_array(in->m->mesh.nv, 4, in->e))) return VG_ENOMEM;
+    a->ncolours = in->m->mesh.nv;
+    for (size_t v = 0; v < a->ncolours; v++) a->colours[4 * v + 3] = 255;
+    return VG_OK;
+}
+
 static int read_vertices(struct reading *in, const struct element *el)
 {
     size_t n = (size_t)el->count;
     in->m->vertices = vgi_array_raw(n, 3 * sizeof *in->m->vertices, in->e);
     if (!in->m->vertices) return VG_ENOMEM;
     in->m->mesh.nv = n;
+    if (begin_colours(in, el) < 0) return VG_ENOMEM;
     if (el->fixed) {
         read_fixed_vertices(in, el);
         if (vgi_finite(in->m->vertices, 3 * n)) return VG_OK;
@@ -560,6 +617,8 @@ static int read_body(struct reading *in)
     while (in->text && in->p < in->end && is_space(*in->p)) in->p++;
     if (in->p < in->end)
         vgi_note(&in->m->note, "left out %zu bytes after the last element", (size_t)(in->end - in->p));
+    if (in->bad_colours)
+        vgi_note(&in->m->note, "left out %zu channels of colours that are out of their range", in->bad_colours);
     if (in->m->mesh.nv == 0) return vg_fail(in->e, VG_EINPUT, "%s has no vertices", in->subject);
     return VG_OK;
 }
@@ -579,7 +638,7 @@ static bool sniff_ply(const unsigned char *data, size_t n)
     return n >= 4 && !memcmp(data, "ply", 3) && (data[3] == '\n' || data[3] == '\r');
 }
 
-enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES };
+enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES | VGI_KEEPS_COLOURS };
 
 const vgi_format vgi_format_ply = {"ply", ".ply", sniff_ply, read_ply, vgi_ply_write_little, vgi_ply_rest_little,
                                    KEEPS};

@@ -1,5 +1,5 @@
-/* ply_write.c: writes PLY polygon files, text and binary in both byte orders: vertices, faces with the colours of
- * their patches, edges.
+/* ply_write.c: writes PLY polygon files, text and binary in both byte orders: vertices with their colours, faces
+ * with the colours of their patches, edges.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "model/colour.h"
@@ -65,18 +65,30 @@ static bool has_colours(const struct writing *x)
     return x->w->patches && x->w->patches->n;
 }
 
+/* Of the colour of a vertex: 0, 3, or 4 if some vertex is not opaque. */
+static int channels_of(const struct writing *x)
+{
+    const vg_attributes *a = x->w->attributes;
+    if (!a || !a->ncolours) return 0;
+    for (size_t v = 0; v < a->ncolours; v++)
+        if (a->colours[4 * v + 3] != 255) return 4;
+    return 3;
+}
+
 static int write_header(struct writing *x)
 {
+    static const char colour[] = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
     const vg_mesh *m = x->w->mesh;
     const char *real = x->w->full_precision ? "double" : "float";
     const char *index = m->nv > (size_t)INT32_MAX + 1 ? "uint" : "int";
-    char text[512];
+    char text[700];
     int n = snprintf(text, sizeof text,
-                     "ply\nformat %s 1.0\nelement vertex %zu\nproperty %s x\nproperty %s y\nproperty %s z\n"
+                     "ply\nformat %s 1.0\nelement vertex %zu\nproperty %s x\nproperty %s y\nproperty %s z\n%s%s"
                      "element face %zu\nproperty list %s %s vertex_indices\n%s",
-                     names[x->encoding], m->nv, real, real, real, x->nfaces, x->long_list ? "uint" : "uchar", index,
-                     has_colours(x) ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
+                     names[x->encoding], m->nv, real, real, real, channels_of(x) ? colour : "",
+                     channels_of(x) > 3 ? "property uchar alpha\n" : "", x->nfaces, x->long_list ? "uint" : "uchar", index,
+                     has_colours(x) ? colour : "");
     int r = vgi_bytes_append(x->out, text, (size_t)n, x->e);
     if (r == VG_OK && x->nfaces < m->nf) {
         n = snprintf(text, sizeof text, "element edge %zu\nproperty %s vertex1\nproperty %s vertex2\n",
@@ -101,11 +113,14 @@ static void wrote(struct writing *x, const char *to)
 static int write_vertices(struct writing *x)
 {
     const vg_mesh *m = x->w->mesh;
+    const size_t channels = (size_t)channels_of(x);
     for (size_t v = 0; v < m->nv; v++) {
-        char *to = reserve_text(x, 3, MOST_NUMBER);
+        char *to = reserve_text(x, 7, MOST_NUMBER);
         if (!to) return VG_ENOMEM;
-        for (int k = 0; k < 3; k++)
-            put_number(&to, x->w->vertices[3 * v + k], x->w->full_precision, x->encoding, k < 2 ? ' ' : '\n');
+        for (size_t k = 0; k < 3; k++)
+            put_number(&to, x->w->vertices[3 * v + k], x->w->full_precision, x->encoding, k < 2 || channels ? ' ' : '\n');
+        for (size_t k = 0; k < channels; k++)
+            put_integer(&to, x->w->attributes->colours[4 * v + k], 1, x->encoding, k + 1 < channels ? ' ' : '\n');
         wrote(x, to);
     }
     return VG_OK;

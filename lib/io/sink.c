@@ -235,7 +235,7 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
                     .own = f && f->warning ? f->warning(s->state) : NULL};
     if (s->mesh)
         x.keeps |= s->mesh_format->keeps &
-                   (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS);
+                   (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS | VGI_KEEPS_COLOURS);
     return vgi_losses_list(&x, line, e);
 }
 

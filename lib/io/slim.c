@@ -47,11 +47,14 @@ static void close_up(vgi_slim *s, const vg_head *h, const bool *attached, uint32
     for (size_t v = 0; v < h->body.mesh.nv; v++) {
         if (!attached[v]) continue;
         memcpy(to->body.reference + 3 * n, h->body.reference + 3 * v, 3 * sizeof *to->body.reference);
+        if (to->body.attributes.ncolours)
+            memcpy(to->body.attributes.colours + 4 * n, h->body.attributes.colours + 4 * v, 4);
         s->kept[n] = (uint32_t)v;
         number[v] = (uint32_t)n++;
     }
     for (size_t c = 0; c < vg_mesh_corners(&h->body.mesh); c++) to->body.mesh.vert[c] = number[h->body.mesh.vert[c]];
     to->body.mesh.nv = to->count = n;
+    if (to->body.attributes.ncolours) to->body.attributes.ncolours = n;
     vg_skeleton_clear(&to->body.skeleton); /* its joints are vertices */
     move_asset(&to->body, number, attached);
 }

@@ -44,7 +44,7 @@ enum { VGI_CRITICAL = 1u, VGI_COPY_SAFE = 2u };
 
 /* In the order in which they are written. */
 enum {
-    VGI_PROV, VGI_MESH, VGI_TEXC, VGI_LABL, VGI_ASST, VGI_SELE, VGI_LINK, VGI_ANCH, VGI_REFP, VGI_SKEL, VGI_CORR, VGI_PTCH,
+    VGI_PROV, VGI_MESH, VGI_TEXC, VGI_LABL, VGI_COLV, VGI_ASST, VGI_SELE, VGI_LINK, VGI_ANCH, VGI_REFP, VGI_SKEL, VGI_CORR, VGI_PTCH,
     VGI_RIG, VGI_SKIN, VGI_MAP, VGI_SIGN, VGI_NETW, VGI_ARTEFACTS
 };
 
@@ -115,7 +115,7 @@ size_t vgi_member_elements(const vgi_member *f, const void *artefact, const vg_m
 /* vgi_type_size: bytes of an element in the stream; 0 for a text. */
 size_t vgi_type_size(vgi_type type);
 
-vgi_check vgi_check_provenance, vgi_check_mesh, vgi_check_texture, vgi_check_labels, vgi_check_asset,
+vgi_check vgi_check_provenance, vgi_check_mesh, vgi_check_texture, vgi_check_labels, vgi_check_colours, vgi_check_asset,
     vgi_check_selection, vgi_check_links, vgi_check_anchors, vgi_check_skeleton, vgi_check_correspondence, vgi_check_patches, vgi_check_rig,
     vgi_check_skin, vgi_check_map, vgi_check_signal, vgi_check_network;
 

@@ -48,6 +48,12 @@ int vgi_check_texture(vg_head *h, void *artefact, const char *where, vg_err *e)
     return VG_OK;
 }
 
+int vgi_check_colours(vg_head *h, void *artefact, const char *where, vg_err *e)
+{
+    const vg_attributes *a = artefact;
+    return a->ncolours == h->body.mesh.nv ? VG_OK : vgi_wrong(where, "it must have a colour for each vertex", e);
+}
+
 int vgi_check_labels(vg_head *h, void *artefact, const char *where, vg_err *e)
 {
     const vg_attributes *a = artefact;

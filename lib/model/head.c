@@ -30,11 +30,11 @@ void vg_mesh_take(vg_mesh *to, vg_mesh *from)
     vgi_fields_move(&vgi_artefacts[VGI_MESH], to, from);
 }
 
-static const int attributes_parts[] = {VGI_TEXC, VGI_LABL}, rig_parts[] = {VGI_RIG, VGI_SKIN};
+static const int attributes_parts[] = {VGI_TEXC, VGI_LABL, VGI_COLV}, rig_parts[] = {VGI_RIG, VGI_SKIN};
 
 void vg_attributes_clear(vg_attributes *a)
 {
-    clear_parts(a, attributes_parts, 2);
+    clear_parts(a, attributes_parts, 3);
 }
 
 void vg_asset_clear(vg_asset *a)
@@ -44,7 +44,7 @@ void vg_asset_clear(vg_asset *a)
 
 int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e)
 {
-    return copy_parts(to, from, sizeof *to, attributes_parts, 2, mesh, e);
+    return copy_parts(to, from, sizeof *to, attributes_parts, 3, mesh, e);
 }
 
 void vg_skeleton_clear(vg_skeleton *s)

@@ -83,6 +83,11 @@ static const vgi_member labl_fields[] = {
     COLUMN(vg_attributes, U32, labels, vg_label, kind, 1, labels),
     COLUMN(vg_attributes, TEXT, labels, vg_label, text, 1, labels)};
 
+LENGTH(colours, vg_attributes, a->ncolours)
+static const vgi_member colv_fields[] = {
+    NUMBER(vg_attributes, U64, ncolours),
+    ARRAY(vg_attributes, U8, colours, 4, colours)};
+
 LENGTH(asset_vertices, vg_asset, a->n)
 LENGTH(asset_bytes, vg_asset, a->size)
 static const vgi_member asst_fields[] = {
@@ -321,6 +326,8 @@ const vgi_artefact vgi_artefacts[VGI_ARTEFACTS] = {
                   FIELDS(texc_fields), .check = vgi_check_texture},
     [VGI_LABL] = {.tag = "LABL", .name = "attributes", .needs = "MESH", IN_BODY(attributes), PRESENT(body.attributes.nlabels),
                   FIELDS(labl_fields), .check = vgi_check_labels},
+    [VGI_COLV] = {.tag = "COLV", .name = "attributes", .needs = "MESH", IN_BODY(attributes), PRESENT(body.attributes.ncolours),
+                  FIELDS(colv_fields), .check = vgi_check_colours},
     [VGI_ASST] = {.tag = "ASST", .name = "asset", .needs = "MESH", IN_BODY(asset), PRESENT(body.asset.n),
                   FIELDS(asst_fields), .check = vgi_check_asset},
     [VGI_SELE] = {.tag = "SELE", .flags = VGI_CRITICAL, .name = "selection", .needs = "MESH",

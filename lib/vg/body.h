@@ -80,6 +80,8 @@ typedef struct vg_attributes {
     uint32_t *corner_tex; /* the texture coordinate of each corner, UINT32_MAX = none; NULL when ntex is 0 */
     size_t nlabels;
     vg_label *labels;
+    size_t ncolours;     /* colours of vertices: 0, or one for each vertex of the mesh */
+    uint8_t *colours;    /* ncolours x 4: red, green, blue (sRGB), opacity */
 } vg_attributes;
 
 void vg_attributes_clear(vg_attributes *a);

@@ -24,7 +24,9 @@ static vg_label mixed_labels[] = {
     {1, VG_LABEL_SMOOTHING, (char *)"off"},     {3, VG_LABEL_GROUP, (char *)""},
     {6, VG_LABEL_MATERIAL, (char *)"last\\"}};
 static const vg_mesh mixed = {9, 6, mixed_start, mixed_vert};
-static const vg_attributes mixed_attributes = {3, 2, mixed_tex, mixed_corner_tex, 7, mixed_labels};
+static uint8_t mixed_colours[] = {255, 0, 0, 255, 0, 128, 0, 254, 0, 0, 1,   255, 1, 2, 3, 0, 4, 5, 6, 7,
+                                  8,   9, 10, 11, 12, 13,  14, 15, 16, 17, 18, 19, 20, 21, 22, 255};
+static const vg_attributes mixed_attributes = {3, 2, mixed_tex, mixed_corner_tex, 7, mixed_labels, 9, mixed_colours};
 
 /* The bytes as they are, at the end of an allocation, so that a sanitizer sees reading beyond. */
 static int read_bytes(vg_model *m, const void *data, size_t n, const char *format, vg_err *e)
@@ -50,6 +52,11 @@ static bool write_mixed(vg_bytes *out, const char *format, bool full)
     return vg_model_write(out, format, &mixed, fitting, &mixed_attributes, full, NULL) == VG_OK;
 }
 
+static bool colours_same(const vg_attributes *a, const vg_attributes *b)
+{
+    return a->ncolours == b->ncolours && (!a->ncolours || !memcmp(a->colours, b->colours, 4 * a->ncolours));
+}
+
 static bool attributes_same(const vg_attributes *a, const vg_attributes *b, size_t corners)
 {
     if (a->ntex != b->ntex || a->tex_dim != b->tex_dim || a->nlabels != b->nlabels) return false;
@@ -59,7 +66,7 @@ static bool attributes_same(const vg_attributes *a, const vg_attributes *b, size
         if (a->labels[i].face != b->labels[i].face || a->labels[i].kind != b->labels[i].kind ||
             strcmp(a->labels[i].text, b->labels[i].text))
             return false;
-    return true;
+    return colours_same(a, b);
 }
 
 static void there_and_back_exactly(void)
@@ -76,6 +83,7 @@ static void there_and_back_exactly(void)
         CHECK(vg_mesh_same(&mixed, "a", &m.mesh, "b", &e) == VG_OK);
         CHECK(m.mesh.nv == 9 && !memcmp(m.vertices, mixed_vertices, sizeof mixed_vertices));
         if (!strcmp(format_names[i], "obj")) CHECK(attributes_same(&mixed_attributes, &m.attributes, 18));
+        else if (strcmp(format_names[i], "off")) CHECK(colours_same(&mixed_attributes, &m.attributes));
         CHECK(vg_model_write(&again, format_names[i], &m.mesh, m.vertices, &m.attributes, true, &e) == VG_OK);
         CHECK(once.size == again.size && !memcmp(once.data, again.data, once.size));
         vg_model_clear(&m);
@@ -115,7 +123,7 @@ static void obj_text_is_as_promised(void)
                                 {1, VG_LABEL_MATERIAL, (char *)"red"},
                                 {1, VG_LABEL_LIBRARY, (char *)"m.mtl"}};
     const vg_mesh mesh = {4, 2, start, vert};
-    const vg_attributes a = {2, 2, uv, tex, 3, labels};
+    const vg_attributes a = {2, 2, uv, tex, 3, labels, 0, NULL};
     CHECK(vg_model_write(&out, "obj", &mesh, x, &a, false, &e) == VG_OK);
     CHECK(vgi_bytes_append(&out, "", 1, &e) == VG_OK);
     CHECK_TEXT((char *)out.data, "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0.1\nvt 0 0\nvt 0.5 1\n"

@@ -148,7 +148,8 @@ static void bad_texture_loses_itself(void)
         {"a.obj", OBJ4 "f 1/1 2/2 3/3\n", "0 1 2", "3 corners name texture coordinates that are not there"},
         {"a.obj", OBJ4 "vt 0 0\nf 1/-1 2/-2 3/0\n", "0 1 2", "2 corners name texture coordinates that are not there"},
         {"a.obj", OBJ4 "vn nan nan nan\nvn -1.#IND 0 0\nf 1//1 2//2 3//99\n", "0 1 2", ""},
-        {"a.obj", "v 0 0 0 1.#QNAN 0 0\nv 1 0 0 red\nv 1 1 0\nf 1 2 3\n", "0 1 2", "left out the colours of its vertices"},
+        {"a.obj", "v 0 0 0 1.#QNAN 0 0\nv 1 0 0 red\nv 1 1 0\nf 1 2 3\n", "0 1 2",
+         "left out 1 colours of vertices that are not numbers from 0 to 1"},
     };
     CHECK_ALL(all);
     vg_model m;
