@@ -161,7 +161,7 @@ EOF
         'property uchar green' 'property uchar blue' 'element face 1' 'property list uchar uint vertex_indices' end_header \
         '0 0 0 0 0 1 0 0 255 0 0' '1 0 0 0 0 1 1 0 255 0 0' '0 1 0 0 0 1 0 1 255 0 0' '3 0 1 2' >blender.ply
     geometry blender.ply
-    [ "$output" = $'0 0 0\n1 0 0\n0 1 0\n3 0 1 2' ] || fail "$output"
+    [ "$output" = $'0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2' ] || fail "$output"
     ply_ascii 3 'property uchar red' 'property float green' 'property ushort blue' 'element face 1' \
         'property list uchar int vertex_indices' end_header '0 0 0 300 0.5 65535' '1 0 0 red nan 0' '1 1 0 7 -1 257' '3 0 1 2' >channels.ply
     must_warn vg-encode channels.ply -o out.vgs
