@@ -152,7 +152,8 @@ end_header
 0 1 0 nan 9 9 255
 4 0 1 2 3
 END
-    must vg-encode c.ply -o c.vgs
+    must_warn vg-encode c.ply -o c.vgs
+    says "1 channels of colours are out of their range"
     for format in ply-ascii ply ply-be obj glb gltf; do
         must vg-decode --format $format c.vgs -o out.${format%%-*}
         must vg-encode out.${format%%-*} -o $format.vgs
@@ -161,12 +162,13 @@ END
         'property float red' 'property float green' 'property float blue' 'property ushort alpha' 'element face 1' \
         'property list uchar int vertex_indices' end_header '0 0 0 1 0.5 0 65535' '1 0 0 2 -1 0.2 0' '0 1 0 0 0 1 257' \
         '3 0 1 2' >float.ply
-    must vg-encode float.ply -o float.vgs
+    must_warn vg-encode float.ply -o float.vgs
+    says "2 channels of colours are out of their range"
     printf 'v 0 0 0\nv 1 0 0 1 0.5 0\nv 0 1 0 0 0 0 0.5\nv 1 1 0\nv 0 0 1 1\nf 1 2 3\n' >part.obj
     must vg-encode part.obj -o part.vgs
     must vg-decode --drop-loose part.obj -o drop.ply
     must vg-encode drop.ply -o drop.vgs
-    pipe 'vg-encode --vectors c.ply | vg-solve -o solved.vgs'
+    pipe 'vg-encode --quiet --vectors c.ply | vg-solve -o solved.vgs'
     must_warn vg-decode c.vgs -o out.off
     says "not kept in 'out.off': colours of vertices"
     py <<'END'

@@ -480,14 +480,14 @@ static int read_edge(struct reading *in, const struct element *el, uint64_t i)
 }
 
 /* A channel of a colour as a byte: integers of 8 and 16 bits span their type, those of 32 bits 0 to 255, binary32 and
- * binary64 0 to 1. One that is out of that range or no number becomes black, or opaque. */
+ * binary64 0 to 1. Beyond that range the nearest end is taken; what is no number becomes black, or opaque. */
 static void put_colour(struct reading *in, const struct property *p, uint64_t i, double x)
 {
     uint8_t *to = in->m->attributes.colours + 4 * i + (p->role - RED);
     if (p->item >= F32) x *= 255;
     else if (p->item == I16 || p->item == U16) x /= 257;
-    if (x >= 0 && x <= 255.5) *to = vgi_byte_of(x / 255);
-    else in->bad_colours++;
+    if (!isnan(x)) *to = vgi_byte_of(x / 255);
+    in->bad_colours += !(x >= 0 && x < 255.5);
 }
 
 static int read_colour(struct reading *in, const struct property *p, const struct element *el, uint64_t i)
@@ -618,7 +618,7 @@ static int read_body(struct reading *in)
     if (in->p < in->end)
         vgi_note(&in->m->note, "left out %zu bytes after the last element", (size_t)(in->end - in->p));
     if (in->bad_colours)
-        vgi_note(&in->m->note, "left out %zu channels of colours that are out of their range", in->bad_colours);
+        vgi_note(&in->m->note, "%zu channels of colours are out of their range", in->bad_colours);
     if (in->m->mesh.nv == 0) return vg_fail(in->e, VG_EINPUT, "%s has no vertices", in->subject);
     return VG_OK;
 }
