@@ -5,11 +5,12 @@
  * joints. A pose is converted to the space of the mesh by the inverse of M at rest, so that skin, nodes and morph
  * targets together show the pose.
  *
- * Normals keep the artist's shading: each is rotated as the adjacent faces are, with their normal and about it.
+ * Normals keep the artist's shading: each is rotated as the adjacent faces are.
  * Vertices that are one vertex of the mesh and have equal normals share these faces, so that edges stay hard and
  * seams stay smooth.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_character.h"
+#include "numeric/polar.h"
 #include "numeric/vec3.h"
 
 #include <math.h>
@@ -40,17 +41,6 @@ static bool invert_matrix(const double m[12], double to[12])
         to[4 * i + 3] = -vgi_dot(to + 4 * i, shift);
     }
     return true;
-}
-
-/* Rotate x by the smallest rotation from a to b; a, b: unit or zero. */
-static void rotate_between(const double a[3], const double b[3], const double x[3], double to[3])
-{
-    const double c = vgi_dot(a, b);
-    double k[3], y[3];
-    vgi_cross(a, b, k);
-    vgi_cross(k, x, y);
-    const double along = vgi_dot(k, x) / (1 + c);
-    for (int i = 0; i < 3; i++) to[i] = c > -0.999999 ? c * x[i] + y[i] + along * k[i] : -x[i];
 }
 
 /* ---- positions of the vertices ---- */
@@ -216,105 +206,86 @@ static int group_normals(vgi_gltf_character *c, vg_err *e)
     return r;
 }
 
-/* Sum the normals of the faces at the corners of each group, weighted by the angle there. */
-static void face_normals(const vgi_gltf_character *c, const double *world, double *to)
+/* The unit sides of a triangle, side k from corner k on, and its unit normal. */
+static void frame_of(const vgi_gltf_character *c, const uint32_t *v, const double *world, double frame[4][3])
+{
+    for (int k = 0; k < 3; k++) {
+        vgi_subtract(world + 3 * (size_t)c->vertex[v[(k + 1) % 3]], world + 3 * (size_t)c->vertex[v[k]], frame[k]);
+        vgi_make_unit(frame[k]);
+    }
+    vgi_cross(frame[0], frame[1], frame[3]);
+    vgi_make_unit(frame[3]);
+}
+
+/* The frames and angles of all triangles in the pose that rotations are measured from. */
+static void set_rest(vgi_gltf_character *c, const double *world)
 {
     const vg_mesh *m = &c->faces.mesh;
-    memset(to, 0, 3 * c->ngroups * sizeof *to);
     for (size_t f = 0; f < m->nf; f++) {
+        vgi_gltf_frame *to = &c->rest[f];
         if (m->start[f + 1] - m->start[f] != 3) continue;
-        const uint32_t *v = m->vert + m->start[f];
-        const double *p[3];
-        double side[3][3], n[3];
-        for (int k = 0; k < 3; k++) p[k] = world + 3 * (size_t)c->vertex[v[k]];
-        for (int k = 0; k < 3; k++) {
-            vgi_subtract(p[(k + 1) % 3], p[k], side[k]);
-            vgi_make_unit(side[k]);
-        }
-        vgi_cross(side[0], side[1], n);
-        vgi_make_unit(n);
-        for (int k = 0; k < 3; k++) {
-            const double *s = side[k], *t = side[(k + 2) % 3];
-            const double angle = acos(fmax(-1, fmin(1, -vgi_dot(s, t))));
-            if (c->group[v[k]] == UINT32_MAX) continue;
-            vgi_add_scaled(to + 3 * (size_t)c->group[v[k]], angle, n);
-        }
+        frame_of(c, m->vert + m->start[f], world, to->frame);
+        for (int k = 0; k < 3; k++)
+            to->angle[k] = acos(fmax(-1, fmin(1, -vgi_dot(to->frame[k], to->frame[(k + 2) % 3]))));
     }
-    for (size_t g = 0; g < c->ngroups; g++) vgi_make_unit(to + 3 * g);
 }
 
-/* Add the rotation of the sides of a face at corner k about the normal of its group. */
-static void add_twist(const vgi_gltf_character *c, const uint32_t *v, int k, const double *world)
+static void add_product(double m[9], double weight, const double d[3], const double r[3])
 {
-    const size_t g = c->group[v[k]];
-    const double *a = c->rest + 3 * g, *b = c->now + 3 * g;
-    const bool still = !memcmp(a, b, 3 * sizeof *a);
-    for (int next = 1; next <= 2; next++) {
-        const size_t from = 3 * (size_t)c->vertex[v[k]], to = 3 * (size_t)c->vertex[v[(k + next) % 3]];
-        double before[3], now[3], turned[3], across[3];
-        vgi_subtract(c->rest_world + to, c->rest_world + from, before);
-        vgi_subtract(world + to, world + from, now);
-        vgi_make_unit(before), vgi_make_unit(now);
-        if (still) memcpy(turned, before, sizeof turned);
-        else rotate_between(a, b, before, turned);
-        vgi_cross(turned, now, across);
-        const double along = vgi_dot(turned, b) * vgi_dot(now, b);
-        c->twist[2 * g] += vgi_dot(turned, now) - along;
-        c->twist[2 * g + 1] += vgi_dot(across, b);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) m[3 * i + j] += weight * (d[i] * r[j]);
+}
+
+/* Add a triangle to the sums of the groups at its corners. The best rotation of the normals and sides of the triangles
+ * around a vertex is defined where the surface folds, too, and the sum of their normals points anywhere. */
+static void add_face(const vgi_gltf_character *c, const vgi_gltf_frame *rest, const uint32_t *v, const double *world)
+{
+    double now[4][3];
+    frame_of(c, v, world, now);
+    for (int k = 0; k < 3; k++) {
+        const int last = (k + 2) % 3;
+        if (c->group[v[k]] == UINT32_MAX) continue;
+        double *m = c->turn + 9 * (size_t)c->group[v[k]];
+        add_product(m, rest->angle[k], now[3], rest->frame[3]);
+        add_product(m, 1, now[k], rest->frame[k]);
+        add_product(m, 1, now[last], rest->frame[last]);
     }
 }
 
-static void find_twists(const vgi_gltf_character *c, const double *world)
+static void sum_faces(const vgi_gltf_character *c, const double *world)
 {
     const vg_mesh *m = &c->faces.mesh;
-    memset(c->twist, 0, 2 * c->ngroups * sizeof *c->twist);
-    for (size_t f = 0; f < m->nf; f++) {
-        const uint32_t *v = m->vert + m->start[f];
-        for (int k = 0; k < 3 && m->start[f + 1] - m->start[f] == 3; k++)
-            if (c->group[v[k]] != UINT32_MAX) add_twist(c, v, k, world);
-    }
+    memset(c->turn, 0, 9 * c->ngroups * sizeof *c->turn);
+    for (size_t f = 0; f < m->nf; f++)
+        if (m->start[f + 1] - m->start[f] == 3) add_face(c, &c->rest[f], m->vert + m->start[f], world);
 }
 
-/* Rotate x about the unit vector b by the angle with this cosine and sine (unnormalised). */
-static void twist_about(const double b[3], const double twist[2], double x[3])
+/* Whether the faces around a group are as in the rest pose: a sum of products of vectors with themselves. */
+static bool is_still(const double m[9])
 {
-    const double l = hypot(twist[0], twist[1]), cosine = l > 0 ? twist[0] / l : 1, sine = l > 0 ? twist[1] / l : 0;
-    const double along = vgi_dot(b, x) * (1 - cosine);
-    double across[3];
-    vgi_cross(b, x, across);
-    for (int i = 0; i < 3; i++) x[i] = cosine * x[i] + sine * across[i] + along * b[i];
-}
-
-/* Whether the faces around a group are as in the rest pose. */
-static bool is_still(const vgi_gltf_character *c, size_t g)
-{
-    return !memcmp(c->rest + 3 * g, c->now + 3 * g, 3 * sizeof *c->now) && c->twist[2 * g + 1] == 0 && c->twist[2 * g] >= 0;
+    return m[1] == m[3] && m[2] == m[6] && m[5] == m[7] && m[0] >= 0 && m[4] >= 0 && m[8] >= 0;
 }
 
 /* A normal in another pose, in the space of its mesh. */
-static void normal_now(const vgi_gltf_character *c, size_t f, double to[3])
+static void normal_now(const vgi_gltf_character *c, size_t f, const double m[9], double to[3])
 {
-    const double *a = c->rest + 3 * (size_t)c->group[f], *b = c->now + 3 * (size_t)c->group[f];
-    double turned[3];
-    if (vgi_length(a) == 0 || vgi_length(b) == 0) memcpy(turned, c->world_normal + 3 * f, sizeof turned);
-    else {
-        rotate_between(a, b, c->world_normal + 3 * f, turned);
-        twist_about(b, c->twist + 2 * (size_t)c->group[f], turned);
-    }
+    double r[9], turned[3];
+    vgi_fit_rotation(m, r);
+    for (int i = 0; i < 3; i++) turned[i] = vgi_dot(r + 3 * i, c->world_normal + 3 * f);
     normal_in(c, f, turned, to);
 }
 
 void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *to)
 {
-    face_normals(c, world, c->now);
-    find_twists(c, world);
+    sum_faces(c, world);
     for (size_t f = 0; f < c->n; f++) {
         float *d = to + 3 * f;
         double n[3];
         memset(d, 0, 3 * sizeof *d);
         if (c->group[f] == UINT32_MAX) continue;
-        if (is_still(c, c->group[f])) continue;
-        normal_now(c, f, n);
+        const double *m = c->turn + 9 * (size_t)c->group[f];
+        if (is_still(m)) continue;
+        normal_now(c, f, m, n);
         for (int k = 0; k < 3; k++) d[k] = (float)(n[k] - c->normal[3 * f + k]);
     }
 }
@@ -330,8 +301,7 @@ static int turn_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
         for (size_t v = 0; v < p->count; v++) point_of(c, p, v, at, shown + 3 * (size_t)c->vertex[p->first + v]);
     }
     if (r == VG_OK) {
-        face_normals(c, shown, c->rest);
-        c->rest_world = shown;
+        set_rest(c, shown);
         vgi_gltf_character_turn(c, b->reference, turned);
         for (size_t f = 0; f < c->n; f++) {
             float *n = c->normal + 3 * f;
@@ -349,12 +319,10 @@ static int find_normals(vgi_gltf_character *c, const vg_body *b, vg_err *e)
     int r = read_normals(c, e);
     if (r < 0 || !c->normal) return r;
     if ((r = group_normals(c, e)) < 0) return r;
-    c->rest = vgi_array(c->ngroups, 3 * sizeof(double), e), c->now = vgi_array(c->ngroups, 3 * sizeof(double), e);
-    c->twist = vgi_array(c->ngroups, 2 * sizeof *c->twist, e);
-    if (!c->rest || !c->now || !c->twist) return VG_ENOMEM;
+    c->rest = vgi_array(c->faces.mesh.nf, sizeof *c->rest, e), c->turn = vgi_array(c->ngroups, 9 * sizeof *c->turn, e);
+    if (!c->rest || !c->turn) return VG_ENOMEM;
     if (!c->kept && (r = turn_base(c, b, e)) < 0) return r;
-    face_normals(c, b->reference, c->rest);
-    c->rest_world = b->reference;
+    set_rest(c, b->reference);
     return VG_OK;
 }
 
@@ -413,7 +381,7 @@ int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 
 void vgi_gltf_character_clear(vgi_gltf_character *c)
 {
-    void *const arrays[] = {c->out, c->in, c->base, c->normal, c->world_normal, c->skinned, c->group, c->rest, c->now, c->twist};
+    void *const arrays[] = {c->out, c->in, c->base, c->normal, c->world_normal, c->skinned, c->group, c->rest, c->turn};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     vg_mesh_clear(&c->faces.mesh);
     vgi_gltf_scene_clear(&c->scene);

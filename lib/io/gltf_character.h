@@ -5,6 +5,11 @@
 
 #include "io/gltf_scene.h"
 
+/* A triangle: its unit sides, its unit normal, and the angles at its corners. */
+typedef struct vgi_gltf_frame {
+    double frame[4][3], angle[3];
+} vgi_gltf_frame;
+
 /* Vertices of the file are those of all parts of the scene, part after part, in the space of their mesh, before a
  * skin or node is applied. */
 typedef struct vgi_gltf_character {
@@ -21,10 +26,8 @@ typedef struct vgi_gltf_character {
     bool touches;           /* different vertices coincide in it, and a reader could weld them */
     uint32_t *group;        /* n: vertices that are one and have one normal; UINT32_MAX without a normal */
     size_t ngroups;
-    double *rest, *now;     /* ngroups x 3: normals of the surrounding faces, in the reference pose and in another */
-    double *twist;          /* ngroups x 2: cosine and sine (unnormalised) of the rotation of the surrounding faces
-                               about that normal */
-    const double *rest_world; /* nv x 3: the rest pose; borrowed */
+    vgi_gltf_frame *rest;   /* of each triangle, in the reference pose */
+    double *turn;           /* ngroups x 9: sums of the surrounding triangles, of which the rotation is the best one */
 } vgi_gltf_character;
 
 /* vgi_gltf_character_open: 1 if the body has an asset that belongs to its mesh; 0 if it has none, or an unusable one.
