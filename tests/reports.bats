@@ -374,7 +374,7 @@ def triangles(name):
     v, f = [], []
     for line in open(name):
         w = line.split()
-        if w[:1] == ['v']: v.append(tuple(round(float(x), 3) + 0.0 for x in w[1:]))
+        if w[:1] == ['v']: v.append(tuple(round(float(x), 3) + 0.0 for x in w[1:4]))
         if w[:1] == ['f']:
             t = [v[int(c.split('/')[0]) - 1] for c in w[1:]]
             f.append(tuple(t[t.index(min(t)):] + t[:t.index(min(t))]))
