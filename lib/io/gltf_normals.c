@@ -26,28 +26,51 @@ typedef struct side {
     uint32_t low, high, face, at_low, at_high; /* at_low, at_high: the corners there */
 } side;
 
-static int by_vertices(const void *a, const void *b)
+/* Order of sides with the same low vertex. */
+static bool is_before(const side *s, const side *t)
 {
-    const side *s = a, *t = b;
-    if (s->low != t->low) return s->low < t->low ? -1 : 1;
-    if (s->high != t->high) return s->high < t->high ? -1 : 1;
-    return (s->face > t->face) - (s->face < t->face);
+    return s->high != t->high ? s->high < t->high : s->face < t->face;
 }
 
-static size_t list_sides(const vg_mesh *m, side *to)
+static void sort_few(side *s, size_t n)
 {
-    size_t n = 0;
-    for (size_t f = 0; f < m->nf; f++) {
-        const uint32_t first = m->start[f], size = (uint32_t)vgi_face_size(m, f);
-        for (uint32_t i = 0; i < size && size > 2; i++) {
-            const uint32_t c = first + i, d = first + (i + 1) % size;
-            const bool rising = m->vert[c] < m->vert[d];
-            to[n++] = rising ? (side){m->vert[c], m->vert[d], (uint32_t)f, c, d}
-                             : (side){m->vert[d], m->vert[c], (uint32_t)f, d, c};
-        }
+    for (size_t i = 1; i < n; i++) {
+        const side moving = s[i];
+        size_t at = i;
+        for (; at > 0 && is_before(&moving, &s[at - 1]); at--) s[at] = s[at - 1];
+        s[at] = moving;
     }
-    qsort(to, n, sizeof *to, by_vertices);
-    return n;
+}
+
+static int by_high(const void *a, const void *b)
+{
+    return is_before(a, b) ? -1 : is_before(b, a);
+}
+
+enum { FEW = 32 };
+
+/* Sides of faces, ordered by low, high and face. ends: where those of a low vertex start, then (nv + 1) where they end. */
+static size_t list_sides(const vg_mesh *m, size_t *ends, side *to)
+{
+    memset(ends, 0, (m->nv + 1) * sizeof *ends);
+    for (int filling = 0; filling < 2; filling++) {
+        for (size_t f = 0; f < m->nf; f++) {
+            const uint32_t first = m->start[f], size = (uint32_t)vgi_face_size(m, f);
+            for (uint32_t i = 0; i < size && size > 2; i++) {
+                const uint32_t c = first + i, d = i + 1 < size ? c + 1 : first, v = m->vert[c], w = m->vert[d];
+                if (!filling) ends[(v < w ? v : w) + 1]++;
+                else if (v < w) to[ends[v]++] = (side){v, w, (uint32_t)f, c, d};
+                else to[ends[w]++] = (side){w, v, (uint32_t)f, d, c};
+            }
+        }
+        for (size_t v = 0; v < m->nv && !filling; v++) ends[v + 1] += ends[v];
+    }
+    for (size_t v = 0; v < m->nv; v++) {
+        const size_t first = v ? ends[v - 1] : 0, n = ends[v] - first;
+        if (n <= FEW) sort_few(to + first, n);
+        else qsort(to + first, n, sizeof *to, by_high);
+    }
+    return m->nv ? ends[m->nv - 1] : 0;
 }
 
 /* The smaller number is kept, so that groups do not depend on the order of edges. */
@@ -106,21 +129,23 @@ int vgi_gltf_normals_make(vgi_gltf_normals *x, const vg_mesh *m, const vg_attrib
     *x = (vgi_gltf_normals){.mesh = m};
     uint32_t *parent = vgi_array_raw(corners, sizeof *parent, e);
     side *sides = vgi_array_raw(corners, sizeof *sides, e);
+    size_t *ends = vgi_array_raw(m->nv + 1, sizeof *ends, e);
     int64_t *smoothing = vgi_array_raw(m->nf, sizeof *smoothing, e);
     double *normal = vgi_array_raw(m->nf, 3 * sizeof *normal, e);
     x->corner = vgi_array_raw(corners, sizeof *x->corner, e);
-    int r = parent && sides && smoothing && normal && x->corner ? VG_OK : VG_ENOMEM;
+    int r = parent && sides && ends && smoothing && normal && x->corner ? VG_OK : VG_ENOMEM;
 
     if (r == VG_OK) {
         read_smoothing(m, a, smoothing);
         for (uint32_t c = 0; c < corners; c++) parent[c] = c;
         for (size_t f = 0; f < m->nf; f++) face_normal(m, f, reference, normal + 3 * f);
-        unite_corners(parent, sides, list_sides(m, sides), smoothing, normal);
+        unite_corners(parent, sides, list_sides(m, ends, sides), smoothing, normal);
         number_groups(x, parent);
         if (!(x->sum = vgi_array(x->ngroups, 3 * sizeof *x->sum, e))) r = VG_ENOMEM;
     }
     free(parent);
     free(sides);
+    free(ends);
     free(smoothing);
     free(normal);
     return r;
@@ -137,19 +162,55 @@ void vgi_gltf_normals_clear(vgi_gltf_normals *x)
 
 /* ---- normals ---- */
 
+/* acos to 3e-8: a polynomial of Hastings (Abramowitz and Stegun 4.4.46). The angles only weigh the normals. */
+static inline double angle_of(double cosine)
+{
+    const double x = cosine < 0 ? -cosine : cosine, rest = x < 1 ? 1 - x : 0, y = x * x, z = y * y;
+    const double low = (1.5707963050 - 0.2145988016 * x) + (0.0889789874 - 0.0501743046 * x) * y;
+    const double high = (0.0308918810 - 0.0170881256 * x) + (0.0066700901 - 0.0012624911 * x) * y;
+    const double angle = sqrt(rest) * (low + high * z);
+    return cosine < 0 ? M_PI - angle : angle;
+}
+
 /* The angle of a face at corner number i of its size. */
 static double angle_at(const vg_mesh *m, size_t f, size_t i, const double *pose)
 {
     const size_t size = vgi_face_size(m, f);
     const uint32_t *v = m->vert + m->start[f];
+    const double *at = pose + 3 * (size_t)v[i];
     double arm[2][3];
-    for (int k = 0; k < 3; k++) {
-        const double at = pose[3 * (size_t)v[i] + (size_t)k];
-        arm[0][k] = pose[3 * (size_t)v[(i + 1) % size] + (size_t)k] - at;
-        arm[1][k] = pose[3 * (size_t)v[(i + size - 1) % size] + (size_t)k] - at;
-    }
+    vgi_subtract(pose + 3 * (size_t)v[(i + 1) % size], at, arm[0]);
+    vgi_subtract(pose + 3 * (size_t)v[(i + size - 1) % size], at, arm[1]);
     vgi_make_unit(arm[0]), vgi_make_unit(arm[1]);
-    return acos(fmax(-1, fmin(1, vgi_dot(arm[0], arm[1]))));
+    return angle_of(vgi_dot(arm[0], arm[1]));
+}
+
+static void add_polygon(vgi_gltf_normals *x, size_t f, const double *pose)
+{
+    const vg_mesh *m = x->mesh;
+    double n[3];
+    face_normal(m, f, pose, n);
+    for (size_t i = 0; i < vgi_face_size(m, f); i++)
+        vgi_add_scaled(x->sum + 3 * (size_t)x->corner[m->start[f] + i], angle_at(m, f, i, pose), n);
+}
+
+/* The same for a triangle, of which most meshes consist. */
+static inline void add_triangle(vgi_gltf_normals *x, uint32_t first, const double *pose)
+{
+    const uint32_t *v = x->mesh->vert + first;
+    const double *p = pose + 3 * (size_t)v[0], *q = pose + 3 * (size_t)v[1], *s = pose + 3 * (size_t)v[2];
+    double pq[3], qs[3], sp[3], n[3];
+    vgi_subtract(q, p, pq), vgi_subtract(s, q, qs), vgi_subtract(p, s, sp);
+    vgi_cross(pq, qs, n);
+    const double size = sqrt(vgi_dot(n, n));
+    if (!(size > 0)) return;
+    const double a = vgi_dot(pq, pq), b = vgi_dot(qs, qs), c = vgi_dot(sp, sp);
+    const double at_p = angle_of(-vgi_dot(pq, sp) / sqrt(a * c)), at_q = angle_of(-vgi_dot(pq, qs) / sqrt(a * b));
+    const double weight[3] = {at_p / size, at_q / size, (M_PI - at_p - at_q) / size};
+    for (uint32_t i = 0; i < 3; i++) {
+        double *to = x->sum + 3 * (size_t)x->corner[first + i];
+        to[0] += weight[i] * n[0], to[1] += weight[i] * n[1], to[2] += weight[i] * n[2];
+    }
 }
 
 static void sum_normals(vgi_gltf_normals *x, const double *pose)
@@ -157,14 +218,9 @@ static void sum_normals(vgi_gltf_normals *x, const double *pose)
     const vg_mesh *m = x->mesh;
     memset(x->sum, 0, 3 * x->ngroups * sizeof *x->sum);
     for (size_t f = 0; f < m->nf; f++) {
-        double n[3];
-        if (vgi_face_size(m, f) < 3) continue;
-        face_normal(m, f, pose, n);
-        for (size_t i = 0; i < vgi_face_size(m, f); i++) {
-            const double angle = angle_at(m, f, i, pose);
-            double *to = x->sum + 3 * (size_t)x->corner[m->start[f] + i];
-            vgi_add_scaled(to, angle, n);
-        }
+        const size_t size = vgi_face_size(m, f);
+        if (size == 3) add_triangle(x, m->start[f], pose);
+        else if (size > 3) add_polygon(x, f, pose);
     }
     for (size_t g = 0; g < x->ngroups; g++) vgi_make_unit(x->sum + 3 * g);
 }
@@ -197,9 +253,7 @@ void vgi_gltf_normals_turn(vgi_gltf_normals *x, const double *pose, float *to)
     sum_normals(x, pose);
     for (size_t v = 0; v < x->n; v++) {
         const double *n = x->group[v] == UINT32_MAX ? NULL : x->sum + 3 * (size_t)x->group[v];
-        for (int k = 0; k < 3; k++) {
-            const float now = n && vgi_length(n) > 0 ? (float)n[k] : x->base[3 * v + (size_t)k];
-            to[3 * v + (size_t)k] = now - x->base[3 * v + (size_t)k];
-        }
+        const bool has = n && (n[0] != 0 || n[1] != 0 || n[2] != 0);
+        for (size_t k = 0; k < 3; k++) to[3 * v + k] = has ? (float)n[k] - x->base[3 * v + k] : 0;
     }
 }
