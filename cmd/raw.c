@@ -1,10 +1,12 @@
 /* raw.c: frames as numbers with nothing around them, for programs that know the mesh already.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "raw.h"
+#include "output.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -60,11 +62,19 @@ raw_input raw_open(const char *file, size_t count, size_t width)
     return in;
 }
 
+/* Before waiting for input, hand on the frames that were written. */
+static void hand_on_before_waiting(int fd)
+{
+    struct pollfd p = {.fd = fd, .events = POLLIN};
+    if (poll(&p, 1, 0) == 0) output_hand_on();
+}
+
 /* as many of n bytes as there are */
 static size_t read_block(raw_input *in, size_t n)
 {
     size_t got = 0;
     while (got < n) {
+        hand_on_before_waiting(in->fd);
         ssize_t r = read(in->fd, in->room + got, n - got);
         if (r < 0 && errno == EINTR) continue;
         if (r < 0) cli_stop(VG_ESYS, "cannot read %s%s%s: %s", in->quote, in->shown, in->quote, strerror(errno));
