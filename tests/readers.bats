@@ -362,3 +362,39 @@ EOF
     must vg-decode -q -o out.glb out.vgs
     [ "$(stat -c %a out.obj out.vgs out.glb | tr '\n' ' ')" = '600 640 664 ' ] || fail "$(stat -c '%a %n' out.*)"
 }
+
+@test "PLY, OFF: texture coordinates and colours of vertices are read; those of faces, points and curves are left out with a word" {
+    ply_ascii 3 'property float s' 'property float t' 'element face 1' 'property list uchar int vertex_indices' \
+        'property list uchar float texcoord' 'property uchar red' end_header '0 0 0 0.5 0.25' '1 0 0 nan 0' '1 1 0 1 1' '3 0 1 2 0 255' >uv.ply
+    must_warn vg-encode uv.ply -o uv.vgs
+    one_line
+    says "left out the colours of its faces; left out the texture coordinates of its faces; left out 1 texture coordinates that are not finite"
+    must vg-decode uv.vgs -o uv.obj
+    [ "$(cat uv.obj)" = $'v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0.5 0.25\nvt 0 0\nvt 1 1\nf 1/1 2 3/3' ] || fail "$(cat uv.obj)"
+    py <<'EOF'
+import struct
+with open("uv-binary.ply", "wb") as f:
+    f.write(b"ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty float x\nproperty double u\nproperty float y\n"
+            b"property float v\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n")
+    for x, y, u, v in (0, 0, 0.5, 0.25), (1, 0, 0, 0), (1, 1, 1, 1):
+        f.write(struct.pack(">fdfff", x, u, y, v, 0))
+    f.write(struct.pack(">Biii", 3, 0, 1, 2))
+EOF
+    must vg-encode uv-binary.ply -o uv.vgs
+    must vg-decode uv.vgs -o uv.obj
+    [ "$(cat uv.obj)" = $'v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0.5 0.25\nvt 0 0\nvt 1 1\nf 1/1 2/2 3/3' ] || fail "$(cat uv.obj)"
+    printf 'STCNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0 1 .5 .25\n1 0 0 0 0 1 0 1 0 0.2 nan 0\n0 1 0 0 0 1 x 0 1 1 1 1\n3 0 1 2 9 9 9\n' >all.off
+    must_warn vg-encode all.off -o all.vgs
+    one_line
+    says "left out 1 malformed colours of vertices; left out the colours of 1 faces; left out 2 texture coordinates that are not finite"
+    must vg-decode all.vgs -o all.obj
+    [ "$(cat all.obj)" = $'v 0 0 0 1 0 0\nv 1 0 0 0 1 0 0.2\nv 0 1 0 1 1 1\nvt 0.5 0.25\nvt 0 0\nvt 0 0\nf 1/1 2 3' ] || fail "$(cat all.obj)"
+    printf 'COFF\n3 1 0\n0 0 0 255 0 51\n1 0 0 0 255 0 51\n0 1 0 0 1 0\n3 0 1 2\n' >bytes.off
+    must vg-encode bytes.off -o bytes.vgs
+    must vg-decode bytes.vgs -o bytes.obj
+    [ "$(grep '^v ' bytes.obj)" = $'v 0 0 0 1 0 0.2\nv 1 0 0 0 1 0 0.2\nv 0 1 0 0 0.003921569 0' ] || fail "$(cat bytes.obj)"
+    printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2\ncurv 0 1 1 2\nf 1 2 3\n' >points.obj
+    must_warn vg-encode points.obj -o points.vgs
+    one_line
+    says "left out 2 points, curves or surfaces"
+}

@@ -29,6 +29,8 @@ enum {
  * each copy its original. In an asset of a character: the number of vertices, and for each vertex of the file the one
  * it represents; present only if different vertices coincide at rest. */
 #define VGI_GLTF_VERTICES "vg_vertices"
+/* The name of the pose without shapes, before the shapes of a file without animation. */
+#define VGI_GLTF_BASE "base"
 
 typedef struct vgi_gltf_buffer {
     const unsigned char *data;

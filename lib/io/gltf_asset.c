@@ -302,6 +302,18 @@ void vgi_gltf_pack_clear(packing *k)
     vg_bytes_clear(&k->data);
 }
 
+static bool has_name(const vgi_json *item)
+{
+    const char *name = vgi_json_text(vgi_json_get(item, "name"));
+    return name && *name;
+}
+
+/* Whether a node or mesh has a name. */
+static bool has_names(const vgi_gltf_scene *x)
+{
+    return has_name(vgi_json_at(vgi_json_get(x->g.json, "nodes"), 0)) || has_name(vgi_json_at(vgi_json_get(x->g.json, "meshes"), 0));
+}
+
 /* Whether the file holds more than faces, positions, the first texture coordinates and the vertices of the mesh. */
 static bool has_more(const vgi_gltf_scene *x, const vg_mesh *mesh)
 {
@@ -310,7 +322,7 @@ static bool has_more(const vgi_gltf_scene *x, const vg_mesh *mesh)
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
         if (vgi_json_count(vgi_json_get(doc, lists[i]))) return true;
     const bool plain = x->own && x->nparts == 1; /* its normals were computed by the writer */
-    if (x->nnodes > 1 || (mesh->nv != x->all && !x->own)) return true;
+    if (x->nnodes > 1 || (!x->own && (mesh->nv != x->all || has_names(x)))) return true;
     for (size_t i = 0; i < x->nparts; i++)
         for (const char *key = vgi_json_key(x->parts[i].attributes, NULL); key;
              key = vgi_json_key(x->parts[i].attributes, key))

@@ -24,6 +24,14 @@ static int begin_morphs(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e
     return x->packed && x->first ? VG_OK : VG_ENOMEM;
 }
 
+/* Frames as vg-encode reads them from a file of shapes: "base" before all others, none with a time. */
+static void look_for_shapes(vgi_gltf_writing *w, const vg_frame *f)
+{
+    vgi_gltf_morphs *x = w->own;
+    if (w->frames == 0) x->named_shapes = !w->clip && f->name && !strcmp(f->name, VGI_GLTF_BASE);
+    if (f->has_time) x->named_shapes = false;
+}
+
 /* A single frame that is the base itself needs no target and no animation. */
 static int put_morph_frame(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 {
@@ -37,7 +45,8 @@ static int put_morph_frame(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
         vgi_gltf_put_single(x->packed + VGI_GLTF_ITEM * i, d);
         moves |= d != 0;
     }
-    w->still = x->shapes || (w->frames == 0 && !moves && !f->has_time);
+    look_for_shapes(w, f);
+    w->still = x->shapes || x->named_shapes || (w->frames == 0 && !moves && !f->has_time);
     return vgi_output_put(&w->spool, x->packed, VGI_GLTF_ITEM * n, e);
 }
 

@@ -21,6 +21,7 @@ typedef struct vgi_gltf_morphs {
     size_t most;
     double tolerance;      /* in D */
     bool asked, shapes, quantize; /* asked: for a tolerance */
+    bool named_shapes;     /* the frames are a set of shapes, by their names */
     unsigned char *packed; /* a frame in stored form */
     float *first;          /* workspace of one frame */
     /* known at the end: */

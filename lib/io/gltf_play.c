@@ -167,7 +167,7 @@ static int begin_moment(vgi_gltf_scene *x, size_t i, vg_frame *f, vg_err *e)
 /* Shape i - 1 alone, in all meshes that have it; 0: none. */
 static int begin_shape(vgi_gltf_scene *x, size_t i, vg_frame *f, vg_err *e)
 {
-    const char *name = i ? vgi_gltf_shape_name(x, i - 1) : x->frames > 1 ? "base" : "";
+    const char *name = i ? vgi_gltf_shape_name(x, i - 1) : x->frames > 1 ? VGI_GLTF_BASE : "";
     for (size_t n = 0; n < x->nnodes; n++)
         for (size_t t = 0; i > 0 && t < x->nodes[n].nweights; t++)
             if (x->nodes[n].shape_of[t] == i - 1) x->nodes[n].weights[t] = 1;

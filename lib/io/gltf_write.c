@@ -480,7 +480,7 @@ static void note_losses(vgi_gltf_writing *w)
         if (b->attributes.ntex && !w->seams.uv) note_loss(w, "texture coordinates");
         const bool materials_lost = has_materials(&b->attributes) && !w->materials.names.n;
         if (has_groups(w) || materials_lost)
-            note_loss(w, w->materials.names.n ? "groups" : "groups and materials");
+            note_loss(w, !materials_lost ? "groups" : !has_groups(w) ? "materials" : "groups and materials");
     }
     const size_t n = strlen(w->warning);
     if (w->manner->warning) w->manner->warning(w, w->warning + n, sizeof w->warning - n);

@@ -82,6 +82,11 @@ int vgi_append_letter(vg_bytes *to, uint32_t letter, vg_err *e) VG_MUST_CHECK; /
 /* mend.c: what a reader dropped or repaired */
 
 void vgi_note(vg_note *to, const char *format, ...) VG_PRINTF(2, 3); /* add to the line */
+/* looks.c: colours (opaque black at first) and texture coordinates (0 at first) of all vertices; vgi_end_texture: each corner
+ * has that of its vertex. NaN marks a texture coordinate that is left out, with a note. */
+int vgi_begin_colours(vg_model *m, vg_err *e) VG_MUST_CHECK;
+int vgi_begin_texture(vg_model *m, vg_err *e) VG_MUST_CHECK;
+int vgi_end_texture(vg_model *m, size_t corners, vg_err *e) VG_MUST_CHECK;
 void vgi_note_dropped(vg_note *to, size_t faces);                    /* set by vgi_mend_faces */
 /* vgi_mend_faces: like vg_mesh_check, but drops, shortens or cuts faces that name a vertex twice or have fewer
  * than 2 corners, until the mesh is valid. points: of its vertices; a (may be NULL): its labels and corner_tex are

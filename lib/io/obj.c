@@ -24,6 +24,7 @@ struct reading {
     const char *found;  /* ... and store the position of its statement */
     size_t bad_tex;     /* number of malformed texture coordinates */
     size_t bad_colours; /* number of malformed colours of vertices */
+    size_t others;      /* number of points, curves and surfaces, which are left out */
 };
 
 static size_t line_of(const struct reading *in, const char *p)
@@ -478,6 +479,7 @@ static const char *read_statement(struct reading *in, const char *p)
     default:
         for (size_t i = 0; i < sizeof labels / sizeof *labels; i++)
             if (is_word(in, p, labels[i].word)) return read_label(in, p + strlen(labels[i].word), labels[i].kind);
+        in->others += is_word(in, p, "p") || is_word(in, p, "curv") || is_word(in, p, "surf");
     }
     return skip_statement(in, p);
 }
@@ -602,6 +604,7 @@ int vgi_obj_read(vg_model *m, const char *data, size_t n, const char *subject, v
     int r = read_statements(&in);
     if (r < 0) return r;
     if (m->mesh.nv == 0) return vg_fail(e, VG_EINPUT, "%s has no vertices (no line 'v x y z')", subject);
+    if (in.others) vgi_note(&m->note, "left out %zu points, curves or surfaces", in.others);
     if (in.bad_colours)
         vgi_note(&m->note, "left out %zu colours of vertices that are not numbers from 0 to 1", in.bad_colours);
     r = check_vertices(&in);

@@ -1,11 +1,12 @@
-/* off.c: OFF, the object file format of Geomview, as text: vertices and faces. Normals, colours and texture
- * coordinates are skipped; binary files and dimensions other than 3 are refused.
+/* off.c: OFF, the object file format of Geomview, as text: vertices with colours and texture coordinates, and faces.
+ * Normals are skipped, colours of faces too; binary files and dimensions other than 3 are refused.
  *
  * OFF is a sequence of words, independent of lines, but optional data such as colours and normals ends with the line.
  * So up to three interpretations are tried until one fits: elements end with their line, whatever follows; vertices
  * are three words each, and faces end with their line; everything is words.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "model/colour.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,6 +22,9 @@ struct reading {
     vg_err *e;
     vg_model *m;
     size_t start_cap, vert_cap, corners;
+    bool normals, coloured, textured; /* by the keyword: NOFF, COFF, STOFF */
+    float *colour;                    /* 4 per vertex, as the file has them; NAN: none */
+    size_t bad_colours, coloured_faces;
 };
 
 static bool is_blank(char c)
@@ -118,6 +122,7 @@ static int read_header(struct reading *in, size_t *nv, size_t *nf)
         return vg_fail(in->e, VG_EINPUT, "%s is %.*s, whose vertices do not have 3 coordinates, which is not "
                                          "supported",
                        in->subject, (int)n, in->p);
+    in->textured = memchr(in->p, 'S', n), in->coloured = memchr(in->p, 'C', n), in->normals = memchr(in->p, 'N', n);
     in->p += n;
     if (line_goes_on(in) && in->end - in->p >= 6 && !memcmp(in->p, "BINARY", 6))
         return vg_fail(in->e, VG_EINPUT, "%s is binary OFF, which is not supported: write it as text", in->subject);
@@ -172,6 +177,57 @@ static int read_face(struct reading *in)
     return VG_OK;
 }
 
+/* Up to `most` numbers at the end of the line; returns their number, SIZE_MAX with anything else. */
+static size_t read_rest(struct reading *in, double *x, size_t most)
+{
+    size_t n = 0;
+    for (; line_goes_on(in); n++) {
+        const char *after = n < most ? vgi_parse_double(in->p, in->end, &x[n]) : NULL;
+        if (!after || !ends_word(in, after)) return SIZE_MAX;
+        in->p = after;
+    }
+    return n;
+}
+
+/* What follows the coordinates: a normal, three or four numbers of a colour, a texture coordinate. */
+static void read_look(struct reading *in, size_t v)
+{
+    double x[9];
+    const size_t n = read_rest(in, x, 9), first = in->normals ? 3 : 0, last = in->textured ? 2 : 0;
+    const size_t channels = n == SIZE_MAX || n < first + last ? 0 : n - first - last;
+    const bool fits = n != SIZE_MAX && n >= first + last && (channels == 0 || channels == 3 || channels == 4);
+    if (in->textured)
+        for (size_t k = 0; k < 2; k++) in->m->attributes.tex[2 * v + k] = fits ? x[n - 2 + k] : NAN;
+    if (!in->coloured) return;
+    bool good = fits && channels > 0;
+    for (size_t k = 0; k < channels && good; k++) good = x[first + k] >= 0 && x[first + k] <= 255;
+    in->bad_colours += !good;
+    for (size_t k = 0; k < 4; k++)
+        in->colour[4 * v + k] = !good ? NAN : k < channels ? (float)x[first + k] : -1;
+}
+
+static int begin_looks(struct reading *in)
+{
+    if (in->textured && vgi_begin_texture(in->m, in->e) < 0) return VG_ENOMEM;
+    if (!in->coloured) return VG_OK;
+    in->colour = vgi_array_raw(in->m->mesh.nv, 4 * sizeof *in->colour, in->e);
+    return in->colour ? vgi_begin_colours(in->m, in->e) : VG_ENOMEM;
+}
+
+/* Colours from 0 to 1, or, if one is larger, from 0 to 255. Vertices with a malformed one are white. */
+static int end_looks(struct reading *in)
+{
+    const size_t n = 4 * in->m->mesh.nv;
+    float most = 1;
+    for (size_t i = 0; i < n && in->colour; i++)
+        if (in->colour[i] > 1) most = 255;
+    for (size_t i = 0; i < n && in->colour; i++)
+        in->m->attributes.colours[i] = in->colour[i] >= 0 ? vgi_byte_of(in->colour[i] / most) : 255;
+    if (in->bad_colours) vgi_note(&in->m->note, "left out %zu malformed colours of vertices", in->bad_colours);
+    if (in->coloured_faces) vgi_note(&in->m->note, "left out the colours of %zu faces", in->coloured_faces);
+    return vgi_end_texture(in->m, in->corners, in->e);
+}
+
 static int fail_short(struct reading *in, const char *what, size_t i, size_t n)
 {
     return vg_fail(in->e, VG_ETRUNC, "%s ends before %s %zu of %zu", in->subject, what, i, n);
@@ -184,12 +240,15 @@ static int read_elements(struct reading *in, size_t nv, size_t nf)
     for (size_t v = 0; v < nv && r == VG_OK; v++) {
         if (!find_word(in)) return fail_short(in, "vertex", v, nv);
         for (int k = 0; k < 3 && r == VG_OK; k++) r = read_coordinate(in, m->vertices + 3 * v + k);
+        if (!in->bare_vertices && r == VG_OK && (in->coloured || in->textured)) read_look(in, v);
         if (!in->bare_vertices) skip_line(in);
     }
     for (size_t f = 0; f < nf && r == VG_OK; f++) {
         if (!find_word(in)) return fail_short(in, "face", f, nf);
         r = read_face(in);
-        if (!in->bare_faces) skip_line(in);
+        if (in->bare_faces) continue;
+        in->coloured_faces += line_goes_on(in);
+        skip_line(in);
     }
     return r;
 }
@@ -216,8 +275,12 @@ static int read_as(vg_model *m, int bare, const char *data, size_t n, const char
     if (!m->vertices || vgi_grow(&m->mesh.start, &in.start_cap, 1, sizeof *m->mesh.start, e) < 0) return VG_ENOMEM;
     m->mesh.start[0] = 0;
     m->mesh.nv = nv;
-    r = read_elements(&in, nv, nf);
-    return r == VG_OK ? check_end(&in) : r;
+    r = begin_looks(&in);
+    if (r == VG_OK) r = read_elements(&in, nv, nf);
+    if (r == VG_OK) r = check_end(&in);
+    if (r == VG_OK) r = end_looks(&in);
+    free(in.colour);
+    return r;
 }
 
 static int read_off(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)

@@ -1,5 +1,6 @@
-/* ply.c: reads PLY polygon files, text and binary in both byte orders: vertices and their colours, faces, triangle
- * strips, edges. All other elements and properties (normals, user data) are skipped. Writing is in ply_write.c.
+/* ply.c: reads PLY polygon files, text and binary in both byte orders: vertices, their colours and texture coordinates,
+ * faces, triangle strips, edges. All other elements and properties (normals, user data) are skipped. Writing is in
+ * ply_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "model/colour.h"
@@ -12,8 +13,9 @@ enum { MOST_WORDS = 6, SHOWN = 40 }; /* words per header line; bytes of the inpu
 enum type { NO_TYPE, I8, U8, I16, U16, I32, U32, F32, F64 };
 static const unsigned char type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 
-/* The properties that are read. X, Y, Z and RED, GREEN, BLUE, ALPHA in this order. */
-enum role { PASSED_OVER, X, Y, Z, RED, GREEN, BLUE, ALPHA, INDICES, FROM, TO };
+/* The properties that are read. X, Y, Z, and RED, GREEN, BLUE, ALPHA, and U, V in this order. The last two are only named
+ * in a note. */
+enum role { PASSED_OVER, X, Y, Z, RED, GREEN, BLUE, ALPHA, U, V, INDICES, FROM, TO, FACE_COLOUR, FACE_TEXTURE };
 enum kind { OTHER, VERTEX, FACE, EDGE, STRIPS };
 
 struct property {
@@ -141,6 +143,14 @@ static enum role role_named(enum kind kind, struct word name, bool list)
                  {VERTEX, false, "diffuse_red", RED},
                  {VERTEX, false, "diffuse_green", GREEN},
                  {VERTEX, false, "diffuse_blue", BLUE},
+                 {VERTEX, false, "s", U},
+                 {VERTEX, false, "t", V},
+                 {VERTEX, false, "u", U},
+                 {VERTEX, false, "v", V},
+                 {VERTEX, false, "texture_u", U},
+                 {VERTEX, false, "texture_v", V},
+                 {FACE, false, "red", FACE_COLOUR},
+                 {FACE, true, "texcoord", FACE_TEXTURE},
                  {FACE, true, "vertex_indices", INDICES},
                  {FACE, true, "vertex_index", INDICES},
                  {STRIPS, true, "vertex_indices", INDICES},
@@ -171,7 +181,7 @@ static int read_property_line(struct reading *in, const struct word *words, size
     if (p.item == NO_TYPE || (list && p.count == NO_TYPE))
         return vg_fail(in->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", in->subject, shown_length(name),
                        name.at);
-    if (p.role >= RED && p.role <= ALPHA && has_role(in, el, p.role)) p.role = PASSED_OVER;
+    if (((p.role >= RED && p.role <= V) || p.role >= FACE_COLOUR) && has_role(in, el, p.role)) p.role = PASSED_OVER;
     if (p.role && has_role(in, el, p.role))
         return vg_fail(in->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", in->subject, el->name, shown_length(name),
                        name.at);
@@ -198,6 +208,9 @@ static int finish_element(struct reading *in, struct element *el)
     if ((el->kind == FACE || el->kind == STRIPS) && el->count && !has_role(in, el, INDICES))
         return vg_fail(in->e, VG_EINPUT, "%s: its %s have no list vertex_indices", in->subject,
                        el->kind == FACE ? "faces" : "triangle strips");
+    if (el->kind == FACE && has_role(in, el, FACE_COLOUR)) vgi_note(&in->m->note, "left out the colours of its faces");
+    if (el->kind == FACE && has_role(in, el, FACE_TEXTURE))
+        vgi_note(&in->m->note, "left out the texture coordinates of its faces");
     if (el->kind == EDGE && !(has_role(in, el, FROM) && has_role(in, el, TO))) el->kind = OTHER;
     return VG_OK;
 }
@@ -479,6 +492,12 @@ static int read_edge(struct reading *in, const struct element *el, uint64_t i)
     return end_face(in);
 }
 
+/* A texture coordinate of vertex i; one that is not finite marks it by a NaN. */
+static void put_texture(struct reading *in, const struct property *p, uint64_t i, double x)
+{
+    in->m->attributes.tex[2 * i + (p->role == V)] = isfinite(x) ? x : NAN;
+}
+
 /* A channel of a colour as a byte: integers of 8 and 16 bits span their type, those of 32 bits 0 to 255, binary32 and
  * binary64 0 to 1. Beyond that range the nearest end is taken; what is no number becomes black, or opaque. */
 static void put_colour(struct reading *in, const struct property *p, uint64_t i, double x)
@@ -490,7 +509,21 @@ static void put_colour(struct reading *in, const struct property *p, uint64_t i,
     in->bad_colours += !(x >= 0 && x < 255.5);
 }
 
-static int read_colour(struct reading *in, const struct property *p, const struct element *el, uint64_t i)
+/* Whether the file has what belongs to a colour or texture coordinate that is not X, Y or Z. */
+static bool is_wanted(const struct reading *in, enum role role)
+{
+    if (role >= RED && role <= ALPHA) return in->m->attributes.ncolours > 0;
+    return (role == U || role == V) && in->m->attributes.ntex > 0;
+}
+
+static void put_look(struct reading *in, const struct property *p, uint64_t i, double x)
+{
+    if (p->role <= ALPHA) put_colour(in, p, i, x);
+    else put_texture(in, p, i, x);
+}
+
+/* A word that is no number only loses itself. */
+static int read_look(struct reading *in, const struct property *p, const struct element *el, uint64_t i)
 {
     double x = NAN;
     struct word w;
@@ -502,7 +535,7 @@ static int read_colour(struct reading *in, const struct property *p, const struc
     } else if (vgi_parse_double(w.at, w.at + w.n, &x) != w.at + w.n) {
         x = NAN;
     }
-    put_colour(in, p, i, x);
+    put_look(in, p, i, x);
     return VG_OK;
 }
 
@@ -511,9 +544,9 @@ static int read_vertex(struct reading *in, const struct element *el, uint64_t i)
     double *to = in->m->vertices + 3 * i;
     for (size_t k = 0; k < el->n; k++) {
         const struct property *p = &in->properties[el->first + k];
-        int r = p->role == PASSED_OVER || (p->role >= RED && !in->m->attributes.ncolours) ? skip_property(in, p, el, i)
-                     : p->role >= RED ? read_colour(in, p, el, i)
-                                      : read_number(in, p->item, el, i, to + (p->role - X));
+        int r = p->role >= X && p->role <= Z ? read_number(in, p->item, el, i, to + (p->role - X))
+                : is_wanted(in, p->role)     ? read_look(in, p, el, i)
+                                             : skip_property(in, p, el, i);
         if (r < 0) return r;
     }
     if (isfinite(to[0]) && isfinite(to[1]) && isfinite(to[2])) return VG_OK;
@@ -529,9 +562,9 @@ static int read_other(struct reading *in, const struct element *el, uint64_t i)
     return VG_OK;
 }
 
-static void read_fixed_colours(struct reading *r, const struct element *el, const struct property *p, size_t at)
+static void read_fixed_looks(struct reading *in, const struct element *el, const struct property *p, size_t at)
 {
-    for (uint64_t i = 0; i < el->count; i++) put_colour(r, p, i, number_at(r->p + i * el->least + at, p->item, r->swap));
+    for (uint64_t i = 0; i < el->count; i++) put_look(in, p, i, number_at(in->p + i * el->least + at, p->item, in->swap));
 }
 
 /* Binary vertices of fixed size: their positions are known, so the loop needs no checks. */
@@ -542,7 +575,7 @@ static void read_fixed_vertices(struct reading *in, const struct element *el)
     for (size_t k = 0; k < el->n; k++) {
         const struct property *p = &in->properties[el->first + k];
         if (p->role >= X && p->role <= Z) offset[p->role - X] = at, type[p->role - X] = p->item;
-        if (p->role >= RED && p->role <= ALPHA && in->m->attributes.ncolours) read_fixed_colours(in, el, p, at);
+        if (is_wanted(in, p->role)) read_fixed_looks(in, el, p, at);
         at += type_bytes[p->item];
     }
     double *to = in->m->vertices;
@@ -552,17 +585,13 @@ static void read_fixed_vertices(struct reading *in, const struct element *el)
     in->p = p;
 }
 
-/* Colours start as opaque black. */
-static int begin_colours(struct reading *in, const struct element *el)
+/* Make room for colours and texture coordinates, if they are complete. */
+static int begin_looks(struct reading *in, const struct element *el)
 {
-    vg_attributes *a = &in->m->attributes;
     const int channels = has_role(in, el, RED) + has_role(in, el, GREEN) + has_role(in, el, BLUE);
     if (channels > 0 && channels < 3) vgi_note(&in->m->note, "left out colours of vertices without red, green and blue");
-    if (channels < 3) return VG_OK;
-    if (!(a->colours = vgi_array(in->m->mesh.nv, 4, in->e))) return VG_ENOMEM;
-    a->ncolours = in->m->mesh.nv;
-    for (size_t v = 0; v < a->ncolours; v++) a->colours[4 * v + 3] = 255;
-    return VG_OK;
+    if (channels == 3 && vgi_begin_colours(in->m, in->e) < 0) return VG_ENOMEM;
+    return has_role(in, el, U) && has_role(in, el, V) ? vgi_begin_texture(in->m, in->e) : VG_OK;
 }
 
 static int read_vertices(struct reading *in, const struct element *el)
@@ -571,7 +600,7 @@ static int read_vertices(struct reading *in, const struct element *el)
     in->m->vertices = vgi_array_raw(n, 3 * sizeof *in->m->vertices, in->e);
     if (!in->m->vertices) return VG_ENOMEM;
     in->m->mesh.nv = n;
-    if (begin_colours(in, el) < 0) return VG_ENOMEM;
+    if (begin_looks(in, el) < 0) return VG_ENOMEM;
     if (el->fixed) {
         read_fixed_vertices(in, el);
         if (vgi_finite(in->m->vertices, 3 * n)) return VG_OK;
@@ -620,7 +649,7 @@ static int read_body(struct reading *in)
     if (in->bad_colours)
         vgi_note(&in->m->note, "%zu channels of colours are out of their range", in->bad_colours);
     if (in->m->mesh.nv == 0) return vg_fail(in->e, VG_EINPUT, "%s has no vertices", in->subject);
-    return VG_OK;
+    return vgi_end_texture(in->m, in->corners, in->e);
 }
 
 static int read_ply(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
