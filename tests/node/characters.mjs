@@ -126,7 +126,9 @@ function play(gltf, name, times, look) {
     action.setLoop(THREE.LoopOnce);
     action.clampWhenFinished = true;
     action.play();
-    return times.map(t => { action.time = 0; action.paused = false; action.enabled = true; mixer.setTime(t); return look(gltf); });
+    const looks = times.map(t => { action.time = 0; action.paused = false; action.enabled = true; mixer.setTime(t); return look(gltf); });
+    mixer.stopAllAction(); // what this animation does not move is at rest in the next one
+    return looks;
 }
 
 function key_times(gltf, name) {
