@@ -118,11 +118,18 @@ EOF
     printf '# by hand\nOFF # words\n4 1 0\n0 0 0 1 0 0 1 1 0 0 1 0\n4 0 1 2 3 255 0 0\n' >face-colour.off
     printf 'COFF\n4 1 0\n0 0 0 1 0 0 1\n1 0 0 1 0 0 1\n1 1 0 1 0 0 1\n0 1 0 1 0 0 1\n4 0 1 2 3\n' >vertex-colour.off
     local name
-    for name in line glued bare face-colour vertex-colour; do
+    for name in line glued bare; do
         must vg-encode $name.off -o out.vgs
         geometry $name.off
         [ "$output" = "$quad" ] || fail "$name: $output"
     done
+    must_warn vg-encode face-colour.off -o out.vgs
+    says "left out the colours of 1 faces"
+    geometry face-colour.off
+    [ "$output" = "$quad" ] || fail "$output"
+    must vg-encode vertex-colour.off -o out.vgs
+    geometry vertex-colour.off
+    [ "$output" = $'0 0 0 255 0 0\n1 0 0 255 0 0\n1 1 0 255 0 0\n0 1 0 255 0 0\n4 0 1 2 3' ] || fail "$output"
     printf 'OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n4 0 1 2 3\n' >missing.off
     must_fail 3 vg-encode missing.off -o out.vgs
     one_line
