@@ -3,17 +3,42 @@
 #include "signal_texts.h"
 #include "lines.h"
 
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The frame that a line "frame I X Y" places; without "frame I" the next one. */
+static size_t read_place(lines *l, size_t next, size_t frames, double at[2])
+{
+    double x[3];
+    bool named = lines_word(l, "frame");
+    size_t n = lines_numbers(l, x, 3);
+    if (n != (named ? 3 : 2)) lines_stop(l, named ? "'frame NUMBER X Y' expected" : "two numbers expected");
+    if (named && !(x[0] >= 1 && x[0] <= (double)frames && x[0] == floor(x[0])))
+        lines_stop(l, "there is no frame %g: they are numbered from 1 to %zu", x[0], frames);
+    at[0] = x[n - 2], at[1] = x[n - 1];
+    return named ? (size_t)x[0] - 1 : next;
+}
+
 double *read_places(const char *file, size_t frames)
 {
     size_t n = 0;
-    double *place = cli_allocate(frames, 2 * sizeof *place, "places");
+    double *place = cli_allocate(frames, 2 * sizeof *place, "places"), at[2];
+    bool *known = cli_allocate(frames, sizeof *known, "places");
     lines l = lines_open(file);
-    for (; lines_next(&l); n++) {
+    memset(known, 0, frames * sizeof *known);
+    while (lines_next(&l)) {
+        if (lines_word(&l, "control")) continue; /* of vg-info --positions: the curve is fitted to the frames */
         if (n == frames) lines_stop(&l, "there are only %zu frames to place", frames);
-        if (lines_numbers(&l, place + 2 * n, 2) != 2) lines_stop(&l, "two numbers expected");
+        size_t i = read_place(&l, n, frames, at);
+        if (known[i]) lines_stop(&l, "frame %zu is placed twice", i + 1);
+        memcpy(place + 2 * i, at, sizeof at);
+        known[i] = true;
+        n++;
     }
     if (n < frames) cli_stop(VG_EINPUT, "'%s' places %zu frames of %zu", file, n, frames);
     lines_close(&l);
+    free(known);
     return place;
 }
 

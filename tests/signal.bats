@@ -182,6 +182,15 @@ assert (f[2]['x'], f[2]['y'], f[9]['x'], f[9]['y']) == (0.5, -0.25, -1, 1), f"
 import json, sys
 f = json.load(sys.stdin)['frame_errors']
 assert [(a['x'], a['y']) for a in f] == [(i % 5, i * i % 7) for i in range(1, 22)], f"
+    must vg-info --positions placed.signal
+    echo "$output" | tac >again.txt # in any order
+    must vg-fitsignal -q --place again.txt "$(horse vgs)" -o again.signal
+    [ "$(vg-info --positions again.signal)" = "$(vg-info --positions placed.signal)" ]
+    for line in 'frame 2 0 0' 'frame 22 0 0' 'frame 1.5 0 0' 'frame 1 0'; do
+        { echo 'frame 2 1 1' && echo "$line"; } >bad.txt
+        run -3 vg-fitsignal --place bad.txt "$(horse vgs)" -o out.signal
+        [[ $output == *"'bad.txt' line 2: "* ]]
+    done
     head -20 places.txt >short.txt
     run -3 vg-fitsignal --place short.txt "$(horse vgs)" -o out.signal
     [[ $output == *"'short.txt' places 20 frames of 21"* ]]
