@@ -174,6 +174,42 @@ static void nearest_points_by_normal(void)
     vg_head_clear(&h);
 }
 
+/* The tree leaves out boxes whose normals do not fit: it finds what the nearest of surfaces of one face each finds. */
+static void boxes_of_other_normals_are_left_out(void)
+{
+    enum { FACES = 12 * 9, POINTS = 150 };
+    vg_head h = new_shape();
+    vgi_surface *whole, *alone[FACES];
+    add_torus(&h, 12, 9, (const double[3]){0, 0, 0});
+    CHECK(h.body.mesh.nf == FACES);
+    CHECK(vgi_surface_new(&whole, &h.body.mesh, h.body.reference, NULL) == VG_OK);
+    for (size_t f = 0; f < FACES; f++) {
+        bool take[FACES] = {false};
+        take[f] = true;
+        CHECK(vgi_surface_of(&alone[f], &h.body.mesh, h.body.reference, take, NULL) == VG_OK);
+    }
+    size_t found = 0, farther = 0;
+    for (size_t i = 0; i < POINTS; i++) {
+        static const double cosines[] = {-0.5, 0, 0.5, 0.9, 0.99, 0.9999};
+        double p[3] = {4 * noise(), 4 * noise(), 4 * noise()}, n[3] = {noise(), noise(), noise()}, cosine = cosines[i % 6];
+        double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), best = INFINITY;
+        vgi_hit hit, one;
+        for (int k = 0; k < 3; k++) n[k] /= length;
+        for (size_t f = 0; f < FACES; f++)
+            if (vgi_surface_nearest(alone[f], p, n, cosine, INFINITY, &one)) best = fmin(best, one.square);
+        bool any = vgi_surface_nearest(whole, p, n, cosine, INFINITY, &hit);
+        CHECK(any == (best < INFINITY));
+        if (!any) continue;
+        CHECK(hit.square == best);
+        CHECK(vgi_surface_nearest(whole, p, NULL, 0, INFINITY, &one));
+        found++, farther += hit.square > one.square;
+    }
+    CHECK(found > POINTS / 2 && found < POINTS && farther > POINTS / 4); /* all cases occur */
+    for (size_t f = 0; f < FACES; f++) vgi_surface_free(&alone[f]);
+    vgi_surface_free(&whole);
+    vg_head_clear(&h);
+}
+
 /* A chain of springs, both ends held: the solution is a straight line; then the numbers change and the pattern stays.
  */
 static void sparse_systems(void)
@@ -674,6 +710,7 @@ static void dense_seeds(void)
 }
 
 TESTS({"nearest points", nearest_points}, {"nearest points by normal", nearest_points_by_normal},
+      {"boxes of other normals are left out", boxes_of_other_normals_are_left_out},
       {"sparse systems", sparse_systems}, {"markers as text", markers_as_text}, {"seeds as text", seeds_as_text},
       {"identity on real meshes", identity_on_real_meshes},
       {"identity on generated meshes", identity_on_generated_meshes}, {"fans", fans},

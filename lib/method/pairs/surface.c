@@ -20,6 +20,8 @@ struct triangle {
 /* Node i has the children 2i and 2i + 1. Node k of depth d holds the triangles n k / 2^d to n (k + 1) / 2^d. */
 struct box {
     double least[3], most[3];
+    double axis[3], cosine, sine; /* of a cone that holds the normals of its faces and their vertices; cosine < 0: none is so
+                                   * narrow, or a face has no normal */
 };
 
 struct vgi_surface {
@@ -188,6 +190,62 @@ static void widen_box(struct box *box, const double least[3], const double most[
     }
 }
 
+static const double *corner_normal(const vgi_surface *s, uint32_t corner)
+{
+    return s->vertex_normal + 3 * (size_t)s->m->vert[corner];
+}
+
+/* The normals between which those of a triangle lie: of its face, then of its corners on the mesh. */
+static size_t list_normals(const vgi_surface *s, const struct triangle *t, const double *list[4])
+{
+    uint32_t begin = s->m->start[t->face], r = s->m->start[t->face + 1] - begin;
+    list[0] = s->normal + 3 * (size_t)t->face;
+    list[1] = corner_normal(s, t->corner), list[2] = corner_normal(s, begin + (t->corner - begin + 1) % r);
+    if (r == 3) list[3] = corner_normal(s, begin + 2);
+    return r == 3 ? 4 : 3;
+}
+
+/* The cone about box->axis, of this half angle. */
+static void set_cone(struct box *box, double half)
+{
+    static const double margin = 1e-7;
+    bool narrow = half + margin < M_PI / 2;
+    box->cosine = narrow ? cos(half + margin) : -1;
+    box->sine = narrow ? sin(half + margin) : 0;
+}
+
+static double angle_between(const double a[3], const double b[3])
+{
+    return acos(fmax(-1, fmin(1, vgi_dot(a, b))));
+}
+
+static void make_leaf_cone(const vgi_surface *s, struct box *box, size_t begin, size_t end)
+{
+    const double *list[4];
+    double half = 0;
+    memset(box->axis, 0, sizeof box->axis);
+    for (size_t j = begin; j < end; j++)
+        for (size_t k = list_normals(s, &s->triangle[j], list); k-- > 0;) vgi_add(box->axis, list[k]);
+    if (!(vgi_make_unit(box->axis) > 0)) half = M_PI;
+    for (size_t j = begin; j < end; j++) {
+        size_t n = list_normals(s, &s->triangle[j], list);
+        if (!(vgi_dot(list[0], list[0]) > 0)) half = M_PI;
+        for (size_t k = 0; k < n; k++)
+            if (vgi_dot(list[k], list[k]) > 0) half = fmax(half, angle_between(box->axis, list[k]));
+    }
+    set_cone(box, half);
+}
+
+static void join_cones(struct box *box, const struct box *a, const struct box *b)
+{
+    vgi_sum(a->axis, b->axis, box->axis);
+    if (a->cosine < 0 || b->cosine < 0 || !(vgi_make_unit(box->axis) > 0)) {
+        set_cone(box, M_PI);
+        return;
+    }
+    set_cone(box, fmax(angle_between(box->axis, a->axis) + acos(a->cosine), angle_between(box->axis, b->axis) + acos(b->cosine)));
+}
+
 static void make_boxes(vgi_surface *s)
 {
     uint64_t leaves = (uint64_t)1 << s->depth;
@@ -197,6 +255,7 @@ static void make_boxes(vgi_surface *s)
         if (i < leaves) {
             widen_box(box, s->box[2 * i].least, s->box[2 * i].most);
             widen_box(box, s->box[2 * i + 1].least, s->box[2 * i + 1].most);
+            join_cones(box, &s->box[2 * i], &s->box[2 * i + 1]);
             continue;
         }
         size_t begin, end;
@@ -209,6 +268,7 @@ static void make_boxes(vgi_surface *s)
             widen_box(box, b, b);
             widen_box(box, c, c);
         }
+        make_leaf_cone(s, box, begin, end);
     }
 }
 
@@ -369,11 +429,6 @@ static double triangle_distance(const struct triangle *t, const double p[3], dou
     return best;
 }
 
-static const double *corner_normal(const vgi_surface *s, uint32_t corner)
-{
-    return s->vertex_normal + 3 * (size_t)s->m->vert[corner];
-}
-
 /* Whether the normal fits. On sharp edges and tips the vertex normals are tested too, because normals of the adjacent
  * faces do not represent the surface there. */
 static bool normal_fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal,
@@ -409,6 +464,13 @@ static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const doubl
     }
 }
 
+/* Whether some normal in the box may fit: the angle to its axis is at most that of the cone and that of the cosine together. */
+static bool may_fit(const struct box *b, const double *normal, double cosine, double sine)
+{
+    if (!normal || b->cosine < 0 || !(b->cosine > -cosine)) return true;
+    return vgi_dot(b->axis, normal) >= cosine * b->cosine - sine * b->sine;
+}
+
 bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *normal, double cosine, double limit,
                          vgi_hit *hit)
 {
@@ -417,7 +479,7 @@ bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *
         int depth;
         double square;
     } stack[DEEPEST + 2];
-    double best = limit;
+    double best = limit, sine = sqrt(fmax(0, 1 - cosine * cosine));
     int top = 0;
     if (normal && !(vgi_dot(normal, normal) > 0)) normal = NULL;
     hit->face = UINT32_MAX;
@@ -437,8 +499,8 @@ bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *
             struct place swap = near;
             near = far, far = swap;
         }
-        if (far.square <= best) stack[top++] = far;
-        if (near.square <= best) stack[top++] = near;
+        if (far.square <= best && may_fit(&s->box[far.node], normal, cosine, sine)) stack[top++] = far;
+        if (near.square <= best && may_fit(&s->box[near.node], normal, cosine, sine)) stack[top++] = near;
     }
     return hit->face != UINT32_MAX;
 }
