@@ -20,8 +20,8 @@ static const cli_option options[] = {
      .text = &opts.onto, .reads = true},
     {"correspondence", 0, "FILE", "for a target with another connectivity: the output of vg-register",
      .text = &opts.correspondence, .reads = true, .needs = "onto"},
-    {"by", 0, "blend|pose|gradient|shape", "what is transferred (default: blend; gradient with --correspondence)",
-     .choice = &opts.by_choice, .needs = "onto"},
+    {"by", 0, "auto|offset|blend|pose|gradient|shape",
+     "what is transferred (default: offset; with --correspondence gradient where no part of the source rests)", .choice = &opts.by_choice, .needs = "onto"},
     {"root", 0, "centroid|stay|V",
      "motion of the body: that of the centroid (default), none, or that of vertex V", .text = &opts.root,
      .needs = "onto"},
@@ -65,13 +65,14 @@ enum { BATCH = 8, MOST_EXAMPLES = 1000 }; /* poses of one call: the lanes of the
 
 /* How the output is computed from the poses. */
 typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE, RIDE, JOINTS } way;
-typedef enum by { BY_BLEND, BY_POSE, BY_GRADIENT, BY_SHAPE } by;
+typedef enum by { BY_AUTO, BY_OFFSET, BY_BLEND, BY_POSE, BY_GRADIENT, BY_SHAPE } by;
 typedef enum pin { PIN_AUTO, PIN_ALWAYS, PIN_NONE } pin;
 
 typedef struct work {
     vg_head *h;               /* the source's until the output's is made of it */
     vg_head target;
     vg_head pairs;            /* holds the correspondence */
+    double *fitted;           /* of the correspondence: the source fitted to the target; NULL: it has none */
     vg_head source;           /* mesh and reference of the sequence, whose head gets the target's: the steps borrow
                                  them */
     vg_graph *from, *to;      /* graphs of source and target: the same one without a correspondence */
@@ -80,6 +81,8 @@ typedef struct work {
     vg_kind kind;             /* what comes in */
     vg_deformer *deformer;
     vg_cross_transfer *carrier;
+    vg_cross_transfer *expressions; /* by offset, for poses in which part of the source rests; NULL: as the others */
+    vg_pinner *rests;         /* finds that part */
     vg_shaper *shaper;
     vg_rider *rider;
     joint_transfer *joints;   /* from one skeleton to another */
@@ -128,13 +131,28 @@ static void set_root(work *w)
 
 /* ---- frames ---- */
 
+/* The poses in which part of the source rests go by offset, the others by gradient. */
+static void carry_batch(work *w, size_t n, const double *const *in, double *const *out)
+{
+    const double *from[2][BATCH] = {{NULL}};
+    double *to[2][BATCH] = {{NULL}};
+    size_t count[2] = {0};
+    for (size_t i = 0; i < n; i++) {
+        const uint32_t *still;
+        size_t k = w->expressions && vg_pinner_find(w->rests, in[i], &still) > 0;
+        from[k][count[k]] = in[i], to[k][count[k]++] = out[i];
+    }
+    vg_cross_transfer_apply(w->carrier, count[0], from[0], to[0]);
+    if (count[1]) vg_cross_transfer_apply(w->expressions, count[1], from[1], to[1]);
+}
+
 static void run_batch(work *w, size_t n, const double *const *in, double *const *out)
 {
     switch (w->way) {
     case MEASURE: vg_deformer_measure(w->deformer, n, w->kind, in, out); break;
     case APPLY: vg_deformer_apply(w->deformer, n, in, out); break;
     case TRANSFER: vg_deformer_transfer(w->deformer, n, w->kind, in, out); break;
-    case CARRY: vg_cross_transfer_apply(w->carrier, n, in, out); break;
+    case CARRY: carry_batch(w, n, in, out); break;
     case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
     case JOINTS: break; /* with what a frame says beside its values */
     case RIDE:
@@ -221,8 +239,8 @@ static void warn_degenerate(void *context)
 static void check_kind(work *w)
 {
     const char *advice = NULL;
-    if (w->kind == VG_DEFORMATIONS && !cli_given("by")) w->by = BY_POSE;
-    if (opts.correspondence && !cli_given("by")) w->by = BY_GRADIENT;
+    if (w->by == BY_AUTO && w->kind == VG_DEFORMATIONS) w->by = BY_POSE;
+    if (w->by == BY_AUTO && !opts.correspondence) w->by = BY_OFFSET;
     if (w->kind == VG_FEATURES || w->kind == VG_COORDINATES) advice = "vg-deform takes vertices, vectors or deformations";
     else if (w->kind == VG_TRANSFORMS) advice = "convert them to vertices with 'vg-play MAP' first";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";
@@ -233,10 +251,34 @@ static void check_kind(work *w)
     cli_stop(VG_EINPUT, "the input holds %s: %s", vg_head_form(w->h), advice);
 }
 
+/* A correspondence and its frame, the source as it was fitted to the target. */
+static void load_pairs(work *w)
+{
+    vg_err e;
+    vg_source *s;
+    vg_frame f = {0};
+    char name[420];
+    snprintf(name, sizeof name, "'%.400s'", opts.correspondence);
+    if (vg_source_open(&s, &opts.correspondence, 1, &e) < 0) cli_die(&e);
+    const vg_head *h = vg_source_head(s);
+    if (vg_head_need(h, "correspondence", name, &e) < 0 || vg_head_copy(&w->pairs, h, &e) < 0) cli_die(&e);
+    if (h->kind == VG_VERTICES && h->count == h->correspondence.source_nv) {
+        if (vg_frame_shape(&f, h, &e) < 0) cli_die(&e);
+        int r = vg_source_next(s, &f, &e);
+        if (r < 0) cli_die(&e);
+        if (r > 0) {
+            w->fitted = cli_allocate(3 * h->count, sizeof *w->fitted, "the fitted source");
+            memcpy(w->fitted, f.values, 3 * h->count * sizeof *w->fitted);
+        }
+        vg_frame_clear(&f);
+    }
+    vg_source_close(&s);
+}
+
 static void load_target(work *w)
 {
     if (opts.onto) cli_load(&w->target, opts.onto, "mesh");
-    if (opts.correspondence) cli_load(&w->pairs, opts.correspondence, "correspondence");
+    if (opts.correspondence) load_pairs(w);
 }
 
 static bool fits_target(const work *w, const vg_head *target)
@@ -402,10 +444,30 @@ static void keep_source(work *w)
     if (from->mesh.nv) memcpy(to->reference, from->reference, 3 * from->mesh.nv * sizeof *to->reference);
 }
 
+static vg_cross_transfer *make_carrier(const work *w, vg_method method)
+{
+    vg_err e;
+    vg_cross_transfer *c;
+    const double *target = w->target.body.reference;
+    int r = vg_cross_transfer_new(&c, &w->source.body.mesh, w->source.body.reference, &w->pairs.correspondence, w->to, target,
+                                  method, cli_threads(), &e);
+    if (r == VG_OK && method == VG_BY_OFFSET && w->fitted) r = vg_cross_transfer_fitted(c, target, w->fitted, &e);
+    if (r < 0) cli_die(&e);
+    return c;
+}
+
+static void make_expressions(work *w)
+{
+    vg_err e;
+    w->expressions = make_carrier(w, VG_BY_OFFSET);
+    if (vg_pinner_new(&w->rests, w->from, w->source.body.reference, w->from, NULL, false, &e) < 0) cli_die(&e);
+}
+
 static void make_step(work *w)
 {
     static const vg_method methods[] = {
-        [BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT, [BY_BLEND] = VG_BY_BLEND};
+        [BY_AUTO] = VG_BY_GRADIENT, [BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT, [BY_BLEND] = VG_BY_BLEND,
+        [BY_OFFSET] = VG_BY_OFFSET};
     vg_err e;
     const vg_head *t = &w->target;
     vg_method method = methods[w->by];
@@ -414,8 +476,8 @@ static void make_step(work *w)
     w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
-        r = vg_cross_transfer_new(&w->carrier, &w->source.body.mesh, w->source.body.reference, &w->pairs.correspondence, w->to,
-                           t->body.reference, method, cli_threads(), &e);
+        w->carrier = make_carrier(w, method);
+        if (w->by == BY_AUTO && w->fitted) make_expressions(w);
     } else if (w->way == SHAPE) {
         r = vg_shaper_new(&w->shaper, w->to, w->source.body.reference, t->body.reference, cli_threads(), &e);
     } else {

@@ -66,7 +66,7 @@ END
         poses=$DATA/${set%:*}.tar.xz rest=$DATA/${set#*:}.rest.obj
         must vg-register -q --aligned "$rest" "$rest" -o pairs.vgs
         must vg-encode --reference "$rest" "$poses" -o walk.vgs
-        for by in pose gradient blend; do
+        for by in auto pose gradient blend offset; do
             pipe "vg-deform --by $by --onto '$rest' --correspondence pairs.vgs walk.vgs | vg-solve >out.vgs"
             must vg-diff -c -t 1e-10 walk.vgs out.vgs
         done
@@ -180,4 +180,34 @@ END
         vg-deform --onto '$woman.rest.obj' --correspondence pairs.vgs | vg-solve >out.vgs"
     at_most "$(vertex_error mean --centred "$woman.tar.gz" out.vgs)" 0.012
     at_most "$(vertex_error max --centred "$woman.tar.gz" out.vgs)" 0.03
+}
+
+# ---- against ground truth: a head of another person and topology --------------------------------------------------------
+
+# The truth adds the offsets of the source's shapes to the target, point by point, so that the share of the motion that
+# arrives is the projection of what moved on what should have.
+@test "shapes of a whole head onto another's face: the motion arrives, eyelids included, and what stays does" {
+    [ -n "${VG_DATA:-}" ] || skip "needs the data kit: VG_DATA names its directory"
+    other=$VG_DATA/face/head-other.rest.obj
+    must vg-register -q "$VG_DATA/face/head-shapes.tar.xz" "$other" --markers "$VG_DATA/correspondences/head-other.markers.txt" -o pairs.vgs
+    pipe "vg-encode '$VG_DATA/face/head-shapes.tar.xz' | vg-deform --onto '$other' --correspondence pairs.vgs | vg-solve -o shapes.vgs"
+    must vg-encode "$VG_DATA/face/head-other.truth.tar.xz" -o truth.vgs
+    py <<'END'
+import read_stream
+got, want = read_stream.read_stream("shapes.vgs"), read_stream.read_stream("truth.vgs")
+rest = want.reference
+D = sum((max(rest[k::3]) - min(rest[k::3])) ** 2 for k in range(3)) ** 0.5
+shares, misses = [], []
+for f, t in list(zip(got.frames, want.frames))[1:]:
+    moved = [a - b for a, b in zip(f.values, rest)]
+    true = [a - b for a, b in zip(t.values, rest)]
+    square = sum(x * x for x in true)
+    shares.append(sum(x * y for x, y in zip(moved, true)) / square)
+    misses.append((sum((x - y) ** 2 for x, y in zip(moved, true)) / square) ** 0.5)
+    for v in range(0, len(true), 3):
+        if max(map(abs, true[v:v + 3])) < 1e-6 * D:
+            assert sum(x * x for x in moved[v:v + 3]) ** 0.5 < 5e-4 * D, (f.name, v // 3)
+assert len(shares) == 10
+assert sum(shares) / 10 > 0.98 and min(shares) > 0.93 and sum(misses) / 10 < 0.045, (shares, misses)
+END
 }

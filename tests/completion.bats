@@ -38,11 +38,11 @@ offers() {
 
 @test "values of fixed choice" {
     complete_line vg-deform --by ''
-    offers blend gradient pose shape
+    offers auto blend gradient offset pose shape
     complete_line vg-deform --onto woman.obj --by g
     offers gradient
     complete_line vg-deform --by =
-    offers blend gradient pose shape
+    offers auto blend gradient offset pose shape
     complete_line vg-deform --by = s
     offers shape
     complete_line vg-deform --root ''
@@ -101,7 +101,7 @@ offers() {
     must fish --no-config -c "source '$ROOT/completion/vg.fish'; complete --do-complete 'vg-solve --no-p'"
     [[ $output == --no-provenance$'\t'?* ]]
     must fish --no-config -c "source '$ROOT/completion/vg.fish'; complete --do-complete 'vg-deform --by '"
-    [ "$(cut -f 1 <<<"$output" | LC_ALL=C sort | tr '\n' ' ')" = 'blend gradient pose shape ' ]
+    [ "$(cut -f 1 <<<"$output" | LC_ALL=C sort | tr '\n' ' ')" = 'auto blend gradient offset pose shape ' ]
     for program in vg-encode vg-diff; do
         must fish --no-config -c "source '$ROOT/completion/vg.fish'; complete --do-complete '$program --'"
         diff <(cut -f 1 <<<"$output" | sed 's/=$//' | LC_ALL=C sort) \
@@ -118,5 +118,5 @@ offers() {
             <("$program" --help | grep -o '^  \(-., \|    \)--[a-z0-9-]*' | sed 's/.*--/--/' | LC_ALL=C sort)
     done
     must zsh -f -c 'source <(sed "/^_vg \"/d" "$1"); _vg_specs vg-deform' zsh "$ROOT/completion/_vg"
-    shows '--by=[' ':(blend pose gradient shape)' ':(centroid stay)' '-o[write'
+    shows '--by=[' ':(auto offset blend pose gradient shape)' ':(centroid stay)' '-o[write'
 }

@@ -197,7 +197,7 @@ every_program() {
     answers vg-solve v.vgs -o s.vgs || return 1
     answers vg-solve --weights area --planar v.vgs -o s.vgs || return 1
     answers vg-deform "$k.vgs" -o d.vgs || return 1
-    for by in pose gradient blend shape; do
+    for by in pose gradient blend offset shape; do
         answers vg-deform --onto "$k-target.obj" --by $by "$k.vgs" -o d.vgs || return 1
         if [ "$status" = 0 ]; then answers vg-solve d.vgs -o s.vgs || return 1; fi
     done

@@ -21,7 +21,7 @@ same() {
     for program in $(each_program); do grep -q "vg-${program#vg-} " "$ROOT/tests/same.bats" || fail "$program is not tried here"; done
     same poses.vgs vg-encode --no-provenance "$A"
     same vectors.vgs vg-encode --no-provenance --vectors --faces selected "$A"
-    for by in pose shape blend; do
+    for by in pose shape blend offset; do
         same $by.vgs vg-deform --no-provenance --onto "$DATA/horse.rest.obj" --by $by --root stay first.poses.vgs
     done
     same between.vgs vg-interpolate --no-provenance 20 --smooth first.poses.vgs

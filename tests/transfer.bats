@@ -51,7 +51,7 @@ first_poses() {
     must vg-encode --reference "$rest" "$poses" -o all.vgs
     must vg-encode --reference "$rest" --faces selected "$poses" -o selected.vgs
     for file in all selected; do
-        for by in pose gradient blend; do
+        for by in pose gradient blend offset; do
             pipe "vg-deform --onto '$rest' --by $by $file.vgs | vg-solve >out.vgs"
             must vg-diff -t 1e-10 "$poses" out.vgs
         done
@@ -168,7 +168,7 @@ differ() {
 
 # ---- against ground truth: mean error in D --------------------------------------------------------------------------
 
-@test "man onto heavy: the mean error is at most 0.0074 D, with selected faces at most 3 % more" {
+@test "man onto heavy: the mean error is at most 0.0066 D, with selected faces at most 3 % more" {
     must vg-encode "$DATA/human-man-poses.tar.xz" -o all.vgs
     must vg-encode --faces selected all.vgs -o selected.vgs
     for file in all selected; do
@@ -176,12 +176,12 @@ differ() {
     done
     all=$(vertex_error mean -c "$DATA/human-heavy-poses.tar.xz" all.out)
     selected=$(vertex_error mean -c "$DATA/human-heavy-poses.tar.xz" selected.out)
-    at_most "$all" 0.0074
+    at_most "$all" 0.0066
     at_most 0.001 "$all" # as small as that it cannot be: then it is the comparison that is wrong
     at_most "$selected" "$(python3 -c "print(1.03 * $all)")"
 }
 
-@test "face A onto face B: the mean error is at most 0.0022 D, with selected faces at most 3 % more" {
+@test "face A onto face B: the mean error is at most 0.0018 D, with selected faces at most 3 % more" {
     must vg-encode "$DATA/faceA.tar.xz" -o all.vgs
     must vg-encode --faces selected all.vgs -o selected.vgs
     for file in all selected; do
@@ -189,7 +189,7 @@ differ() {
     done
     all=$(vertex_error mean -c "$DATA/faceB.tar.xz" all.out)
     selected=$(vertex_error mean -c "$DATA/faceB.tar.xz" selected.out)
-    at_most "$all" 0.0022
+    at_most "$all" 0.0018
     at_most 0.0001 "$all"
     at_most "$selected" "$(python3 -c "print(1.03 * $all)")"
 }

@@ -71,9 +71,10 @@ int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference,
                     vg_err *e) VG_MUST_CHECK;
 void vg_deformer_free(vg_deformer **d);
 /* What is transferred to the target (MATH 5): the rotation and scale of the corner (T 4.2); the deformation
- * gradient of the face (Sumner and Popovic 2004), for polygons; or the mean of both results. Line segments and
- * links always use the first. */
-typedef enum vg_method { VG_BY_POSE = 0, VG_BY_GRADIENT = 1, VG_BY_BLEND = 2 } vg_method;
+ * gradient of the face (Sumner and Popovic 2004), for polygons; the mean of both results; or the source's deformed
+ * vector at the target's size, to which the difference of the two reference vectors is added, turned with the face.
+ * Line segments and links always use the first. */
+typedef enum vg_method { VG_BY_POSE = 0, VG_BY_GRADIENT = 1, VG_BY_BLEND = 2, VG_BY_OFFSET = 3 } vg_method;
 /* vg_deformer_target: apply deformations to these reference vectors (one per corner of the graph, copied) from now
  * on. */
 int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e) VG_MUST_CHECK;

@@ -110,6 +110,19 @@ static inline vg_head make_torus(uint32_t u, uint32_t v)
     return h;
 }
 
+/* A sheet in the plane z = 0, of n x n uneven quads, stretched by a along x and b along y. */
+static inline vg_head make_sheet(uint32_t n, double a, double b)
+{
+    vg_head h = new_shape();
+    for (uint32_t i = 0; i <= n; i++)
+        for (uint32_t k = 0; k <= n; k++)
+            add_vertex(&h, a * (i + 0.2 * sin(3 * i + k)), b * (k + 0.2 * cos(i * k + 1)), 0);
+    for (uint32_t i = 0; i < n; i++)
+        for (uint32_t k = 0; k < n; k++)
+            FACE(&h, i * (n + 1) + k, (i + 1) * (n + 1) + k, (i + 1) * (n + 1) + k + 1, i * (n + 1) + k + 1);
+    return h;
+}
+
 /* One face of r corners: a star that is concave (every second corner pulled in) and bent (a saddle), if asked. */
 static inline vg_head make_ngon(size_t r, double pull, double bend)
 {

@@ -68,7 +68,8 @@ static void carried_clear(carried *r)
     free(r->expected);
 }
 
-static const vg_method methods[] = {VG_BY_POSE, VG_BY_GRADIENT, VG_BY_BLEND};
+static const vg_method methods[] = {VG_BY_POSE, VG_BY_GRADIENT, VG_BY_BLEND, VG_BY_OFFSET};
+enum { METHODS = sizeof methods / sizeof *methods };
 
 /* A source that only turns turns every target by the same rotation, whatever drives what. */
 static void rotation_passes(void)
@@ -78,7 +79,7 @@ static void rotation_passes(void)
     vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 3, true);
     motion t = turn(2.5, 1, 3);
     double *pose = move_points(&t, source.body.reference, source.body.mesh.nv);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < METHODS; i++) {
         carried r = carry(&source, &target, &k, pose, methods[i], 1);
         double worst = 0;
         for (size_t c = 0; c < vg_graph_corners(r.g); c++) {
@@ -103,7 +104,7 @@ static void identity_is_exact(void)
         vg_head *h = &all[n];
         vg_correspondence k = identity_pairs(&h->body.mesh);
         double *pose = warp(h->body.reference, h->body.mesh.nv, 0.3);
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < METHODS; i++) {
             carried r = carry(h, h, &k, pose, methods[i], 2);
             double *truth = vectors_of(r.g, pose);
             CHECK_NEAR(farthest(truth, r.vectors, vg_graph_corners(r.g)), 0,
@@ -125,7 +126,7 @@ static void triangles_onto_themselves(void)
     vg_correspondence k = chance_pairs(&h.body.mesh, &h.body.mesh, 2, true);
     for (size_t f = 0; f < h.body.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = (uint32_t)f;
     double *pose = warp(h.body.reference, h.body.mesh.nv, 0.3);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < METHODS; i++) {
         carried r = carry(&h, &h, &k, pose, methods[i], 2);
         double *truth = vectors_of(r.g, pose), worst = 0, length = 0;
         for (size_t f = 0; f < h.body.mesh.nf; f++) {
@@ -133,7 +134,7 @@ static void triangles_onto_themselves(void)
             for (size_t c = 3 * (size_t)h.body.mesh.start[f]; c < 3 * (size_t)h.body.mesh.start[f + 1]; c++)
                 worst = fmax(worst, fabs(truth[c] - r.vectors[c])), length = fmax(length, fabs(truth[c]));
         }
-        if (methods[i] == VG_BY_GRADIENT) CHECK_NEAR(worst, 0, 1e-12);
+        if (methods[i] == VG_BY_GRADIENT || methods[i] == VG_BY_OFFSET) CHECK_NEAR(worst, 0, 1e-12);
         else CHECK(worst < 0.2 * length && worst > 1e-6); /* one rotation a face, not one a corner: close */
         free(truth);
         carried_clear(&r);
@@ -170,6 +171,44 @@ static void unmatched_is_rigid(void)
     free(pose);
     vg_head_clear(&source);
     vg_head_clear(&target);
+}
+
+/* A flat sheet and the same one stretched by diag(a, b), which is also how it was fitted: the vectors of the target in
+ * the source's size are those of the source, scaled by the ratio of the two sizes, and what they grow by in a pose that
+ * turns and stretches the sheet is added to the target's, turned. */
+static void offset_adds_growth(void)
+{
+    static const double p = 1.6, q = 0.7, c = 0.6, s = 0.8;
+    vg_head h = make_sheet(6, 1, 1), other = make_sheet(6, 0.5, 0.9);
+    size_t nv = h.body.mesh.nv;
+    vg_correspondence k = chance_pairs(&h.body.mesh, &other.body.mesh, 2, true);
+    for (size_t f = 0; f < h.body.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = (uint32_t)f;
+    vg_graph *g = graph_of(&other);
+    double *t = vectors_of(g, other.body.reference), *r = vectors_of(g, h.body.reference), *w = room(3 * vg_graph_corners(g), sizeof *w);
+    double *pose = room(3 * nv, sizeof *pose), worst = 0, affine = 0;
+    double scale = vg_diagonal(other.body.reference, nv) / vg_diagonal(h.body.reference, nv);
+    for (size_t v = 0; v < nv; v++) {
+        double y = q * h.body.reference[3 * v + 1];
+        memcpy(pose + 3 * v, (double[]){p * h.body.reference[3 * v], c * y, s * y}, 3 * sizeof *pose);
+    }
+    vg_cross_transfer *x;
+    vg_err e;
+    CHECK(vg_cross_transfer_new(&x, &h.body.mesh, h.body.reference, &k, g, other.body.reference, VG_BY_OFFSET, 1, &e) == VG_OK);
+    CHECK(vg_cross_transfer_fitted(x, other.body.reference, other.body.reference, &e) == VG_OK);
+    const double *in = pose;
+    vg_cross_transfer_apply(x, 1, &in, &w);
+    for (size_t i = 0; i < 3 * vg_graph_corners(g); i += 3) {
+        double u = t[i] + scale * (p - 1) * r[i], v = t[i + 1] + scale * (q - 1) * r[i + 1];
+        worst = fmax(worst, fabs(w[i] - u) + fabs(w[i + 1] - c * v) + fabs(w[i + 2] - s * v));
+        affine = fmax(affine, fabs(u - p * t[i]));
+    }
+    CHECK_NEAR(worst, 0, 1e-12);
+    CHECK(affine > 0.01); /* the gradient's answer is another */
+    vg_cross_transfer_free(&x);
+    free(t), free(r), free(w), free(pose);
+    vg_graph_free(&g);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&h), vg_head_clear(&other);
 }
 
 static void threads_do_not_matter(void)
@@ -222,7 +261,7 @@ static void cycles_find_their_beginning(void)
     vg_correspondence k = identity_pairs(&source.body.mesh);
     k.target_digest = vg_mesh_digest(&target.body.mesh);
     double *pose = warp(source.body.reference, source.body.mesh.nv, 0.3);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < METHODS; i++) {
         carried r = carry(&source, &target, &k, pose, methods[i], 1);
         double *truth = vectors_of(r.g, pose);
         CHECK_NEAR(farthest(truth, r.vectors, vg_graph_corners(r.g)), 0,
@@ -303,7 +342,7 @@ static void points_drive_nothing(void)
     memcpy(pose + 15, pose + 9, 3 * sizeof *pose);
     vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 2, true);
     k.source[0] = 0, k.source[1] = 1;
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < METHODS; i++) {
         carried r = carry(&source, &target, &k, pose, methods[i], 1);
         for (size_t c = 0; c < 3; c++) {
             double w[3];
@@ -427,7 +466,7 @@ static void a_fold_is_finite(void)
     for (int matched = 0; matched < 2; matched++) {
         vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 2, matched);
         k.source[0] = 0, k.source[1] = 1;
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < METHODS; i++) {
             carried r = carry(&source, &target, &k, fold, methods[i], 1);
             for (size_t c = 0; c < vg_graph_corners(r.g); c++) {
                 double d2 = 0, w2 = 0;
@@ -538,6 +577,7 @@ TESTS({"a turning source turns every target", rotation_passes},
       {"a mesh paired with itself comes back exactly", identity_is_exact},
       {"triangles onto themselves by gradients are exact", triangles_onto_themselves},
       {"unmatched faces are rigid", unmatched_is_rigid},
+      {"by offset a sheet grows as the source does", offset_adds_growth},
       {"the thread count changes no bit", threads_do_not_matter},
       {"degenerate source faces are counted and drive nothing", degenerate_sources_are_counted},
       {"cycles find their beginning", cycles_find_their_beginning},

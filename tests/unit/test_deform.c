@@ -27,7 +27,8 @@ static vg_deformer *deformer(const vg_graph *g, const double *reference, int thr
     return d;
 }
 
-static const vg_method methods[] = {VG_BY_POSE, VG_BY_GRADIENT, VG_BY_BLEND};
+static const vg_method methods[] = {VG_BY_POSE, VG_BY_GRADIENT, VG_BY_BLEND, VG_BY_OFFSET};
+enum { METHODS = sizeof methods / sizeof *methods };
 
 static void aim_by(vg_deformer *d, const vg_graph *g, const double *target, vg_method method)
 {
@@ -597,6 +598,42 @@ static void test_gradient(void)
     }
 }
 
+/* ---- by offset ---- */
+
+/* A sheet that stays flat has a face's rotation in closed form: the map diag(p, q) has none, and what turns it turns
+ * everything. The rotation of a corner is the smallest from r to its image. With b = t - scale r the wanted vector is
+ * the turned scale diag(p, q) r + (b + b as the corner turns it) / 2. */
+static void test_offset(void)
+{
+    static const double p = 1.7, q = 0.6, a = 0.8, b = 1.3, c = 0.8, s = 0.6; /* the sheet turns about x */
+    vg_head h = make_sheet(5, 1, 1), other = make_sheet(5, a, b);
+    vg_graph *g = graph_of(&h);
+    size_t nv = h.body.mesh.nv, corners = vg_graph_corners(g);
+    double *pose = room(3 * nv, sizeof *pose), *w = room(3 * corners, sizeof *w), worst = 0, source2 = 0, target2 = 0;
+    double *r = vectors_of(g, h.body.reference), *t = vectors_of(g, other.body.reference);
+    for (size_t v = 0; v < nv; v++) {
+        double y = q * h.body.reference[3 * v + 1];
+        memcpy(pose + 3 * v, (double[]){p * h.body.reference[3 * v], c * y, s * y}, 3 * sizeof *pose);
+    }
+    vg_deformer *d = deformer(g, h.body.reference, 1);
+    aim_by(d, g, other.body.reference, VG_BY_OFFSET);
+    vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &w);
+    for (size_t i = 0; i < 3 * corners; i++) source2 += r[i] * r[i], target2 += t[i] * t[i];
+    double scale = sqrt(target2 / source2);
+    for (size_t i = 0; i < 3 * corners; i += 3) {
+        double x = r[i], y = r[i + 1], e[2] = {t[i] - scale * x, t[i + 1] - scale * y};
+        double angle = atan2(q * y, p * x) - atan2(y, x);
+        double u = scale * p * x + (e[0] + cos(angle) * e[0] - sin(angle) * e[1]) / 2;
+        double v = scale * q * y + (e[1] + sin(angle) * e[0] + cos(angle) * e[1]) / 2;
+        worst = fmax(worst, fabs(w[i] - u) + fabs(w[i + 1] - c * v) + fabs(w[i + 2] - s * v));
+    }
+    CHECK_NEAR(worst, 0, 1e-12);
+    vg_deformer_free(&d);
+    free(pose), free(w), free(r), free(t);
+    vg_graph_free(&g);
+    vg_head_clear(&h), vg_head_clear(&other);
+}
+
 /* ---- target = source, through the solve ---- */
 
 static double self_transfer(vg_head *h, size_t n, const double *const *poses, vg_method method, int threads)
@@ -632,7 +669,7 @@ static void test_onto_itself(void)
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
         double *pose = warp(h.body.reference, h.body.mesh.nv, 1);
-        for (size_t k = 0; k < 3; k++) {
+        for (size_t k = 0; k < METHODS; k++) {
             double worst = self_transfer(&h, 1, CONST(&pose), methods[k], 1);
             if (!(worst <= 1e-10)) printf("%s, method %zu:\n", name, k);
             CHECK_NEAR(worst, 0, 1e-10);
@@ -648,7 +685,7 @@ static void test_onto_itself(void)
                {"faceB.tar.xz", NULL, 6}};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
         film f = load_film(all[i].poses, all[i].rest, all[i].most);
-        for (size_t k = 0; k < 3; k++) {
+        for (size_t k = 0; k < METHODS; k++) {
             double worst = self_transfer(&f.h, f.n, CONST(f.pose), methods[k], 2);
             if (!(worst <= 1e-10)) printf("%s, method %zu:\n", all[i].poses, k);
             CHECK_NEAR(worst, 0, 1e-10);
@@ -667,4 +704,5 @@ TESTS({"Frames and Rodrigues as the formulas have them", test_formulas}, {"a J r
       {"a face that collapses in one pose", test_collapsed_in_one_pose},
       {"where degenerate begins", test_where_degenerate_begins},
       {"nothing but finite numbers", test_nothing_but_finite},
-      {"gradient and blend as the formulas have them", test_gradient}, {"onto itself", test_onto_itself})
+      {"gradient and blend as the formulas have them", test_gradient},
+      {"offset on a flat sheet as the formula has it", test_offset}, {"onto itself", test_onto_itself})

@@ -4,8 +4,10 @@
  * Elsewhere one map of the source faces drives all corners.
  * The correspondence comes from register.c; the loops over corners are in transfer_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/pairs/places.h"
 #include "method/pairs/transfer_kernel.h"
 #include "numeric/face.h"
+#include "numeric/vec3.h"
 #include "method/vectors/moments.h"
 #include "model/incidence.h"
 
@@ -14,6 +16,7 @@
 #include <stdlib.h>
 
 enum { CHUNK = 512, ENOUGH = 64 };
+static const double ALIKE = 0.5; /* largest difference of a face from its places, relative to its vectors */
 
 struct vg_cross_transfer {
     const vg_mesh *source;
@@ -23,10 +26,16 @@ struct vg_cross_transfer {
     int threads;
     const double *source_reference;
     double ratio;          /* size of the target relative to the source */
+    double scale;          /* that of the fitted source */
     double *p, *q;         /* see vgi_source */
     unsigned char *slow;   /* per source face: 1: a line segment; 2: no gradient in the reference pose, never drives */
     double *segment;       /* reference vector of each source face's first corner */
     double *vectors;       /* the target's reference vectors, per corner of its graph */
+    /* By offset, where the source's fit to the target is known; else NULL. */
+    vgi_place *place;      /* per target vertex: where it lies on the source */
+    bool *placed;          /* per target face: it goes by the places of its vertices */
+    double *offset;        /* per corner: the target's reference vector less that of the places at the target's size */
+    double *points[VGI_LANES]; /* the places in eight poses */
     vgi_incidence around;  /* of the target, only with links */
     /* Target faces that go corner by corner ("twins"): a graph of them over the source's vertices, and its result for
      * eight poses. */
@@ -269,6 +278,10 @@ void vg_cross_transfer_free(vg_cross_transfer **out)
     free(c->bad);
     free(c->segment);
     free(c->vectors);
+    free(c->place);
+    free(c->placed);
+    free(c->offset);
+    for (int i = 0; i < VGI_LANES; i++) free(c->points[i]);
     free(c->maps);
     vgi_incidence_clear(&c->around);
     free(c->twin);
@@ -383,9 +396,25 @@ static void add_drift(const transfer_job *j, size_t f, const vgi_map *map)
         }
 }
 
+/* Add the vectors of the places, at the target's size. */
+static void add_places(const transfer_job *j, size_t f)
+{
+    const vg_cross_transfer *c = j->c;
+    size_t begin = c->target->faces.start[f], r = c->target->faces.start[f + 1] - begin;
+    const uint32_t *vert = c->target->faces.vert + begin;
+    for (size_t k = 0; k < j->lanes; k++) {
+        double centre[3];
+        vgi_face_centre(c->points[k], vert, r, centre);
+        for (size_t i = 0; i < r; i++)
+            for (size_t a = 0; a < 3; a++)
+                j->out[k][3 * (begin + i) + a] += c->scale * (c->points[k][3 * (size_t)vert[i] + a] - centre[a]);
+    }
+}
+
 static void follow_face(const transfer_job *j, size_t f)
 {
     static const vgi_follow how[] = {[VG_BY_POSE] = VGI_FOLLOW_POSE, [VG_BY_GRADIENT] = VGI_FOLLOW_GRADIENT,
+                                     [VG_BY_OFFSET] = VGI_FOLLOW_GRADIENT,
                                      [VG_BY_BLEND] = VGI_FOLLOW_BLEND};
     const vg_cross_transfer *c = j->c;
     const vg_graph *g = c->target;
@@ -393,7 +422,7 @@ static void follow_face(const transfer_job *j, size_t f)
     vgi_map sum;
     vgi_lanes weight = {0};
     memset(&sum, 0, sizeof sum);
-    bool rigid = f < faces && !c->pairs->matched[f];
+    bool rigid = f < faces && !c->pairs->matched[f], placed = c->placed && c->placed[f];
     if (f < faces) {
         add_sources(c, f, &sum, weight);
     } else { /* a link uses the faces at both ends */
@@ -405,8 +434,10 @@ static void follow_face(const transfer_job *j, size_t f)
         }
     }
     vgi_transfer_kernel_now()->finish(&sum, weight);
-    vgi_transfer_kernel_now()->follow(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin,
+    vgi_transfer_kernel_now()->follow(&sum, rigid || placed ? VGI_FOLLOW_RIGID : how[c->method],
+                                      (placed ? c->offset : c->vectors) + 3 * begin,
                                       g->faces.start[f + 1] - begin, j->out, 3 * begin, j->lanes);
+    if (placed) add_places(j, f);
     if (f >= faces) add_drift(j, f, &sum);
 }
 
@@ -432,6 +463,58 @@ static void transfer_twins(const transfer_job *j)
         }
 }
 
+/* ---- by offset ---- */
+
+static int make_places(vg_cross_transfer *c, const double *target, const double *fitted, vg_err *e)
+{
+    const vg_graph *g = c->target;
+    size_t nv = g->faces.nv;
+    const vg_mesh t = {nv, g->faces.nf - g->nlinks, g->faces.start, g->faces.vert};
+    c->place = vgi_array(nv, sizeof *c->place, e);
+    c->offset = vgi_array(vg_graph_corners(g), 3 * sizeof *c->offset, e);
+    c->placed = vgi_array(g->faces.nf, sizeof *c->placed, e);
+    if (!c->place || !c->offset || !c->placed) return VG_ENOMEM;
+    for (size_t k = 0; k < VGI_LANES; k++)
+        if (!(c->points[k] = vgi_array(nv, 3 * sizeof(double), e))) return VG_ENOMEM;
+    return vgi_places_find(c->place, c->source, fitted, c->pairs, &t, target, c->threads, e);
+}
+
+static void place_points(const vg_cross_transfer *c, const double *pose, double *points)
+{
+    for (size_t v = 0; v < c->target->faces.nv; v++)
+        if (c->place[v].face != UINT32_MAX) vgi_place_point(c->source, &c->place[v], pose, points + 3 * v);
+}
+
+/* Whether target face f can go by the places of its vertices: all have one, and together they look like the face. Else
+ * some of them lie on the other lip or lid. Then its offsets are set. */
+static bool place_face(vg_cross_transfer *c, size_t f)
+{
+    const vg_mesh *m = &c->target->faces;
+    size_t begin = m->start[f], n = m->start[f + 1] - begin;
+    double *offset = c->offset + 3 * begin, off2 = 0, size2 = 0;
+    const double *vector = c->vectors + 3 * begin;
+    if (!c->pairs->matched[f] || n < 3) return false;
+    for (size_t i = begin; i < begin + n; i++)
+        if (c->place[m->vert[i]].face == UINT32_MAX) return false;
+    vgi_face_vectors(c->points[0], m->vert + begin, n, offset);
+    for (size_t i = 0; i < 3 * n; i++) {
+        offset[i] = vector[i] - c->scale * offset[i];
+        off2 += offset[i] * offset[i], size2 += vector[i] * vector[i];
+    }
+    return off2 < ALIKE * ALIKE * size2;
+}
+
+int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_reference, const double *fitted, vg_err *e)
+{
+    const vg_graph *g = c->target;
+    c->scale = vg_diagonal(fitted, c->source->nv) / vg_diagonal(c->source_reference, c->source->nv);
+    int r = make_places(c, target_reference, fitted, e);
+    if (r < 0) return r;
+    place_points(c, c->source_reference, c->points[0]);
+    for (size_t f = 0; f < g->faces.nf - g->nlinks; f++) c->placed[f] = place_face(c, f);
+    return VG_OK;
+}
+
 void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors)
 {
     for (size_t p = 0; p < n; p += VGI_LANES) {
@@ -439,6 +522,7 @@ void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(c->threads, (c->source->nf + CHUNK - 1) / CHUNK, measure_chunk, &j);
         transfer_twins(&j);
+        for (size_t k = 0; k < j.lanes && c->place; k++) place_points(c, j.poses[k], c->points[k]);
         vgi_parallel(c->threads, (c->target->faces.nf + CHUNK - 1) / CHUNK, follow_chunk, &j);
     }
 }

@@ -301,19 +301,31 @@ void vg_deformer_free(vg_deformer **out)
     *out = NULL;
 }
 
-/* k = F_r' r_t / |r| */
-static void make_coordinates(vg_deformer *d)
+/* The target's size relative to the source: the root of the ratio of their sums of squared vectors. */
+static double size_ratio(const vg_deformer *d)
 {
+    double source2 = 0, target2 = 0;
+    size_t n = 3 * (size_t)d->g->faces.start[d->faces];
+    for (size_t i = 0; i < n; i++) source2 += d->vector[i] * d->vector[i], target2 += d->target[i] * d->target[i];
+    return source2 > 0 ? sqrt(target2 / source2) : 1;
+}
+
+/* k = F_r' r_t / |r|, by offset F_r' (r_t - scale r) */
+static void make_coordinates(vg_deformer *d, double scale)
+{
+    bool offset = d->method == VGI_OFFSET;
     size_t corners = vg_graph_corners(d->g);
     for (size_t c = 0; c < corners; c++) {
         const double *q = d->frame + 4 * c, back[4] = {q[0], -q[1], -q[2], -q[3]};
-        vg_quat_apply(back, d->target + 3 * c, d->coordinates + 3 * c);
-        if (d->length[c] > 0) vgi_divide(d->coordinates + 3 * c, d->length[c]);
+        double b[3] = {d->target[3 * c], d->target[3 * c + 1], d->target[3 * c + 2]};
+        if (offset) vgi_add_scaled(b, -scale, d->vector + 3 * c);
+        vg_quat_apply(back, b, d->coordinates + 3 * c);
+        if (!offset && d->length[c] > 0) vgi_divide(d->coordinates + 3 * c, d->length[c]);
     }
 }
 
 /* A face without a usable gradient (nearly a line) is done corner by corner by the scalar code. */
-static void make_gradient(vg_deformer *d, size_t f)
+static void make_gradient(vg_deformer *d, size_t f, double scale)
 {
     const vg_graph *g = d->g;
     size_t begin = g->faces.start[f], r = vgi_face_size(&g->faces, f);
@@ -327,20 +339,20 @@ static void make_gradient(vg_deformer *d, size_t f)
         source2 += d->vector[i] * d->vector[i];
         target2 += d->target[i] * d->target[i];
     }
-    face->rho = sqrt(target2 / source2);
+    face->rho = d->method == VGI_OFFSET ? scale : sqrt(target2 / source2);
     for (size_t c = begin; c < begin + r; c++) {
         vgi_symmetric_times(P, d->vector + 3 * c, d->gradient[c].p);
         for (size_t k = 0; k < 3; k++) d->gradient[c].b[k] = d->target[3 * c + k] - face->rho * d->vector[3 * c + k];
     }
 }
 
-static int make_gradients(vg_deformer *d, vg_err *e)
+static int make_gradients(vg_deformer *d, double scale, vg_err *e)
 {
     if (!d->gradient) d->gradient = vgi_array(vg_graph_corners(d->g), sizeof *d->gradient, e);
     if (!d->gradient_face) d->gradient_face = vgi_array(d->g->faces.nf, sizeof *d->gradient_face, e);
     if (!d->gradient || !d->gradient_face) return VG_ENOMEM;
     for (size_t f = 0; f < d->faces; f++)
-        if (!d->slow[f]) make_gradient(d, f);
+        if (!d->slow[f]) make_gradient(d, f, scale);
     return VG_OK;
 }
 
@@ -351,9 +363,12 @@ int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method m
     d->target = vgi_copy_array(target_vectors, 3 * corners, sizeof *d->target, e);
     if (!d->coordinates) d->coordinates = vgi_array_raw(3 * corners, sizeof *d->coordinates, e);
     if (!d->target || !d->coordinates) return VG_ENOMEM;
-    make_coordinates(d);
-    d->method = method == VG_BY_GRADIENT ? VGI_GRADIENT : method == VG_BY_BLEND ? VGI_BLEND : VGI_POSE;
-    return d->method == VGI_POSE ? VG_OK : make_gradients(d, e);
+    static const vgi_method methods[] = {[VG_BY_POSE] = VGI_POSE, [VG_BY_GRADIENT] = VGI_GRADIENT,
+                                         [VG_BY_BLEND] = VGI_BLEND, [VG_BY_OFFSET] = VGI_OFFSET};
+    double scale = size_ratio(d);
+    d->method = methods[method];
+    make_coordinates(d, scale);
+    return d->method == VGI_POSE ? VG_OK : make_gradients(d, scale, e);
 }
 
 vg_deform_stats vg_deformer_get_stats(const vg_deformer *d)

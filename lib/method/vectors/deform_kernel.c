@@ -7,11 +7,13 @@
  * them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/deform_kernel.h"
-#include "core/wide.h"
+#include "numeric/wide_polar.h"
 
 /* a face has no normal if |n| <= 1e-12 sum |d|^2; a corner has no frame if its vector is parallel to the face normal
  * to 1e-12 */
 static const double flat2 = 1e-24;
+
+static const vgi_polar_stop to_rounding = {.scaled = 4, .enough = 1e-16, .alone = true};
 
 typedef struct vec {
     vgi_wide at[3];
@@ -80,13 +82,19 @@ VGI_INLINE vgi_mask by_pose(const vgi_transfer *t, uint32_t begin, size_t r, vec
     return bad;
 }
 
-/* Wanted vectors from the deformation gradient of the face, from w into g. */
-VGI_INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vec n, const vec *w, vec *g)
+/* Columns of sum d_k p_k'. */
+VGI_INLINE void sum_products(const vgi_transfer *t, uint32_t begin, size_t r, const vec *w, vec y[3])
 {
-    vec y[3] = {{{{0}}}}; /* columns of sum d_k p_k' */
     for (size_t i = 0; i < r; i++)
 #pragma GCC unroll 3
         for (int k = 0; k < 3; k++) y[k] = add(y[k], times(w[i], vgi_same(t->gradient[begin + i].p[k])));
+}
+
+/* Wanted vectors from the deformation gradient of the face, from w into g. */
+VGI_INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vec n, const vec *w, vec *g)
+{
+    vec y[3] = {{{{0}}}};
+    sum_products(t, begin, r, w, y);
     const vgi_gradient_face *face = &t->gradient_face[f];
     for (size_t i = 0; i < r; i++) {
         const double *b = t->gradient[begin + i].b;
@@ -95,6 +103,44 @@ VGI_INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, siz
         for (int k = 0; k < 3; k++) g[i] = add(g[i], times(y[k], vgi_same(b[k])));
         g[i] = add(g[i], times(w[i], vgi_same(face->rho)));
     }
+}
+
+/* The rotation of the face: that of its deformation gradient. */
+VGI_INLINE void turn_face(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vec n, const vec *w, vgi_wide *turn)
+{
+    vec y[3] = {{{{0}}}};
+    vgi_wide m[9];
+    sum_products(t, begin, r, w, y);
+    const double *q = t->gradient_face[f].q;
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++)
+#pragma GCC unroll 3
+        for (int k = 0; k < 3; k++) m[3 * i + k] = y[k].at[i] + n.at[i] * vgi_same(q[k]);
+    vgi_wide_polar(m, turn, to_rounding);
+}
+
+/* The source's vectors, and what the target's differ by, turned by the mean of the rotations of face and corner; in
+ * place in w. Returns the lanes in which a corner has no frame. */
+VGI_INLINE vgi_mask by_offset(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vec n, vec *w)
+{
+    vgi_mask bad = {0};
+    vgi_wide turn[9], scale = vgi_same(t->gradient_face[f].rho);
+    turn_face(t, f, begin, r, n, w, turn);
+    for (size_t i = 0; i < r; i++) {
+        const double *k = t->coordinates + 3 * (size_t)(begin + i), *b = t->gradient[begin + i].b;
+        vgi_wide d2 = dot(w[i], w[i]);
+        vec u = times(w[i], vgi_roots(1.0 / d2)), m = add(n, times(u, -dot(n, u)));
+        vgi_wide m2 = dot(m, m);
+        bad |= ~(d2 > vgi_same(t->shortest2)) | ~(m2 > vgi_same(flat2));
+        m = times(m, vgi_roots(1.0 / m2));
+        vec side = cross(m, u);
+        w[i] = times(w[i], scale);
+#pragma GCC unroll 3
+        for (int a = 0; a < 3; a++)
+            w[i].at[a] += 0.5 * (turn[3 * a] * vgi_same(b[0]) + turn[3 * a + 1] * vgi_same(b[1]) + turn[3 * a + 2] * vgi_same(b[2]) +
+                                 u.at[a] * vgi_same(k[0]) + side.at[a] * vgi_same(k[1]) + m.at[a] * vgi_same(k[2]));
+    }
+    return bad;
 }
 
 /* Face f with r corners in the poses of one part. Returns the lanes with a degenerate corner. */
@@ -115,8 +161,9 @@ VGI_INLINE unsigned transfer_part(const vgi_transfer *t, size_t f, size_t r, siz
     vgi_mask bad = ~(n2 > flat2 * spread * spread);
     n = times(n, 1.0 / vgi_roots(n2));
 
-    if (method != VGI_POSE) by_gradient(t, f, begin, r, n, w, g);
-    if (method != VGI_GRADIENT) bad |= by_pose(t, begin, r, n, w);
+    if (method == VGI_OFFSET) bad |= by_offset(t, f, begin, r, n, w);
+    if (method == VGI_GRADIENT || method == VGI_BLEND) by_gradient(t, f, begin, r, n, w, g);
+    if (method == VGI_POSE || method == VGI_BLEND) bad |= by_pose(t, begin, r, n, w);
     const vec *wanted = method == VGI_GRADIENT ? g : w;
     if (method == VGI_BLEND)
         for (size_t i = 0; i < r; i++) w[i] = times(add(w[i], g[i]), vgi_same(0.5));
@@ -154,6 +201,7 @@ static void transfer(const vgi_transfer *t, size_t first, size_t last, vgi_lane_
     case VGI_POSE: return transfer_by(t, first, last, w, max_corners, VGI_POSE);
     case VGI_GRADIENT: return transfer_by(t, first, last, w, max_corners, VGI_GRADIENT);
     case VGI_BLEND: return transfer_by(t, first, last, w, max_corners, VGI_BLEND);
+    case VGI_OFFSET: return transfer_by(t, first, last, w, max_corners, VGI_OFFSET);
     }
 }
 

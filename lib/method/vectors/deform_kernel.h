@@ -7,12 +7,14 @@
 #include "core/lanes.h"
 
 /* What is transferred: see MATH 5. */
-typedef enum vgi_method { VGI_POSE, VGI_GRADIENT, VGI_BLEND } vgi_method;
+typedef enum vgi_method { VGI_POSE, VGI_GRADIENT, VGI_BLEND, VGI_OFFSET } vgi_method;
 
 /* The deformation gradient of a face is D = (sum d_c r_c' + h n_d n_r') P with P = (sum r_c r_c' + h n_r n_r')^-1.
  * For the target's vector t the wanted vector is D t + rho (d - D r): the second term is the part of the source's
  * vector that no linear map of the face gives, scaled to the target (corners of a bent face are not linear images of
- * one another). With b = t - rho r this is sum d_k (p_k . b) + n_d (q . b) + rho d, p_k = P r_k, q = h P n_r. */
+ * one another). With b = t - rho r this is sum d_k (p_k . b) + n_d (q . b) + rho d, p_k = P r_k, q = h P n_r.
+ * By offset it is rho d + R b with the same b, R half the rotation of D and half that of the corner (Frames), and rho the
+ * ratio of sizes of the whole meshes. */
 typedef struct vgi_gradient {
     double p[3], b[3];
 } vgi_gradient; /* per corner */
@@ -23,9 +25,9 @@ typedef struct vgi_gradient_face {
 /* vgi_transfer_faces: faces first .. last-1, each with 3 or more corners.
  *   start, vert   the graph (vg_graph)
  *   poses         8 poses: positions if `vertices`, else vectors
- *   gradient, gradient_face   for VGI_GRADIENT and VGI_BLEND, see above
- *   coordinates   for VGI_POSE and VGI_BLEND, 3 per corner: the target's vector in the frame of the source's
- *                 reference corner, divided by the length of the source's reference vector
+ *   gradient, gradient_face   for all but VGI_POSE, see above
+ *   coordinates   3 per corner, in the frame of the source's reference corner: for VGI_POSE and VGI_BLEND the target's
+ *                 vector divided by the length of the source's; for VGI_OFFSET b
  *   shortest2     squared length below which a vector is degenerate
  *   skip          1 per face: do nothing
  *   w             workspace of 2 (max corners + 1) points of eight poses
