@@ -400,6 +400,10 @@ EOF
     must vg-encode bytes.off -o bytes.vgs
     must vg-decode bytes.vgs -o bytes.obj
     [ "$(grep '^v ' bytes.obj)" = $'v 0 0 0 1 0 0.2\nv 1 0 0 0 1 0 0.2\nv 0 1 0 0 0.003921569 0' ] || fail "$(cat bytes.obj)"
+    printf 'STCOFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2\n' >words.off
+    must vg-encode words.off -o words.vgs
+    must vg-decode words.vgs -o words.obj
+    [ "$(cat words.obj)" = $'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3' ] || fail "$(cat words.obj)"
     printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2\ncurv 0 1 1 2\nf 1 2 3\n' >points.obj
     must_warn vg-encode points.obj -o points.vgs
     one_line

@@ -144,6 +144,8 @@ npz('own', positions=('<f8', (4, 3), doubles(*square)), verts=('<f8', (1, 3), do
 npz('vxf', vertices=('<f8', (4, 3, 2), doubles(*[value(f, v, k) for v in range(4) for k in range(3) for f in range(2)])), faces=quad)
 npz('vfx', vertices=('<f8', (4, 2, 3), doubles(*[value(f, v, k) for v in range(4) for f in range(2) for k in range(3)])), faces=quad)
 npz('xvf', vertices=('<f8', (3, 4, 2), doubles(*[value(f, v, k) for k in range(3) for v in range(4) for f in range(2)])), faces=quad)
+npz('from1', vertices=('<f8', (5, 4, 3), doubles(*range(60))), faces=('<i4', (2, 3), struct.pack('<6i', 1, 2, 3, 1, 3, 4)))
+npz('more', vertices=('<f8', (4, 3), doubles(*square)), verts=('<f8', (4, 3), doubles(*square)), faces=quad, colors=('<f8', (4, 3), bytes(96)))
 npz('unclear', vertices=('<f8', (4, 3, 2), doubles(*range(24))))
 npz('smpl', poses=('<f8', (2, 72), bytes(8 * 144)), betas=('<f8', (10,), bytes(80)), trans=('<f8', (2, 3), bytes(48)))
 npz('other', weights=('<f8', (2, 5), bytes(80)), labels=('<i8', (), bytes(8)))
@@ -157,9 +159,18 @@ EOF
     must_warn vg-encode points.npz -o out.vgs
     says "left out 1 face"
     for name in vxf vfx xvf; do
-        pipe "vg-encode $name.npz | vg-decode -q --format npy --no-mesh -o - | tail -c 96 | od -An -v -w12 -t f4 | tr -s ' '"
+        pipe "vg-encode -q $name.npz | vg-decode -q --format npy --no-mesh -o - | tail -c 96 | od -An -v -w12 -t f4 | tr -s ' '"
         [ "$output" = $' 0 0 0\n 1 0 0\n 1 1 0\n 0 1 0\n 10 10 10\n 11 10 10\n 11 11 10\n 10 11 10' ] || fail "$name: $output"
     done
+    must_warn vg-encode vfx.npz -o out.vgs
+    one_line
+    says "took the axes of 'vertices' as vertices, frames, x y z"
+    must_fail 3 vg-encode from1.npz -o out.vgs
+    one_line
+    says "array 'faces'" "counts the vertices from 1"
+    must_warn vg-encode more.npz -o out.vgs
+    one_line
+    says "left out the arrays colors, verts"
     must_fail 3 vg-encode unclear.npz -o out.vgs
     one_line
     says "'vertices'" "ambiguous axes" "--array-axes"

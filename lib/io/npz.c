@@ -42,6 +42,7 @@ struct held {
 typedef struct reading {
     const char *subject;
     char inventory[240]; /* all arrays of the file with their shapes, as many as fit, for messages */
+    char unused[160];    /* names of those that are not read */
     bool of_body; /* contains an array of body_names */
     vg_note note;
     struct held held[ARRAYS];
@@ -124,6 +125,13 @@ static int hold_array(reading *x, enum array i, vgi_input *in, const char *subje
     return vg_fail(e, VG_EINPUT, "%s has data after its elements", subject);
 }
 
+static void list_unused(reading *x, const char *path)
+{
+    const size_t n = strlen(x->unused), length = strcspn(path, ".");
+    if (n + length + 6 > sizeof x->unused) return;
+    snprintf(x->unused + n, sizeof x->unused - n, "%s%.*s", n ? ", " : "", (int)length, path);
+}
+
 static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_err *e)
 {
     const char *name;
@@ -132,10 +140,17 @@ static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_er
     char subject[200];
     vgi_input *in;
     list_array(x, path, data);
-    if (i == ARRAYS) return VG_OK; /* a feature array of another program */
+    if (i == ARRAYS) { /* of another program */
+        list_unused(x, path);
+        return VG_OK;
+    }
     snprintf(subject, sizeof subject, "array '%s' in %.150s", name, x->subject);
     if (x->held[i].there && x->held[i].rank == rank) return vg_fail(e, VG_EINPUT, "%s is in the file twice", subject);
-    if (x->held[i].there && x->held[i].rank < rank) return VG_OK;
+    if (x->held[i].there && x->held[i].rank < rank) {
+        list_unused(x, path);
+        return VG_OK;
+    }
+    if (x->held[i].there) list_unused(x, x->held[i].name);
     x->held[i].name = name, x->held[i].rank = rank;
     int r = vgi_input_memory(&in, data->data, data->size, path, e);
     if (r == VG_OK) r = hold_array(x, i, in, subject, e);
@@ -295,12 +310,13 @@ static int holds_no_frames(const reading *x, vg_err *e)
 
 /* ---- axes: frames, vertices and xyz in any order ---- */
 
-/* The number of vertices that the faces or the reference require; exact: not a lower bound. 0: unknown. */
-static size_t vertices_wanted(const reading *x, bool *exact)
+/* The number of vertices that the faces or the reference require; exact: not a lower bound. 0: unknown. *from: the least
+ * index of the faces. */
+static size_t vertices_wanted(const reading *x, bool *exact, size_t *from)
 {
     const struct held *r = &x->held[REFERENCE];
     size_t most = 0;
-    *exact = false;
+    *exact = false, *from = SIZE_MAX;
     if (r->there && r->a.ndim == 2) return *exact = true, (size_t)r->a.shape[0];
     static const enum array lists[] = {FACES, FACE_VERTICES};
     for (int i = 0; i < 2; i++) {
@@ -309,6 +325,7 @@ static size_t vertices_wanted(const reading *x, bool *exact)
         for (size_t k = 0, n = elements(h); k < n; k++) {
             int64_t v = integer_at(h, k);
             if (v >= 0 && (size_t)v + 1 > most) most = (size_t)v + 1;
+            if (v >= 0 && (size_t)v < *from) *from = (size_t)v;
         }
     }
     return most;
@@ -351,11 +368,13 @@ static int find_axes(reading *x, struct held *h, vg_err *e)
 {
     static const int orders[6][3] = {{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {0, 2, 1}, {1, 2, 0}, {2, 1, 0}};
     bool exact;
-    size_t wanted;
+    size_t from;
     int best = 0, score = 0, equals = 0;
     if (h->a.ndim != 3) return VG_OK;
-    wanted = vertices_wanted(x, &exact);
+    const size_t wanted = vertices_wanted(x, &exact, &from);
     if (axes_suit(h->a.shape, orders[0], wanted, exact)) return VG_OK;
+    if (h->a.shape[2] == 3 && from == 1 && wanted == h->a.shape[1] + 1)
+        return wrong_array(x, x->held[FACES].there ? FACES : FACE_VERTICES, "counts the vertices from 1: subtract 1", e);
     for (int i = 1; i < 6; i++) {
         int s = axes_suit(h->a.shape, orders[i], wanted, exact);
         equals = s == score ? equals + 1 : s > score ? 1 : equals;
@@ -365,6 +384,7 @@ static int find_axes(reading *x, struct held *h, vg_err *e)
     if (equals > 1)
         return wrong_array(x, POSITIONS, "has ambiguous axes: name them with --array-axes (vxf: vertices, x y z, frames)", e);
     order_axes(h, orders[best]);
+    if (best == 1) vgi_note(&x->note, "took the axes of '%s' as vertices, frames, x y z", h->name);
     return VG_OK;
 }
 
@@ -545,6 +565,7 @@ static int check_labels(const reading *x, vg_err *e)
 /* Remove faces that are invalid in a mesh, unless the frames have one value per corner. */
 static int mend(reading *x, vg_head *h, vg_err *e)
 {
+    if (h->kind == VG_VERTICES && *x->unused) vgi_note(&x->note, "left out the arrays %s", x->unused);
     if (h->kind != VG_VERTICES || !h->body.mesh.nf) return VG_OK;
     double *first = vgi_array_raw(x->count, 3 * sizeof *first, e);
     int r = first ? copy_floats(x, x->values, 0, 3 * x->count, first, e) : VG_ENOMEM;

@@ -122,7 +122,9 @@ static int read_header(struct reading *in, size_t *nv, size_t *nf)
         return vg_fail(in->e, VG_EINPUT, "%s is %.*s, whose vertices do not have 3 coordinates, which is not "
                                          "supported",
                        in->subject, (int)n, in->p);
-    in->textured = memchr(in->p, 'S', n), in->coloured = memchr(in->p, 'C', n), in->normals = memchr(in->p, 'N', n);
+    in->textured = !in->bare_vertices && memchr(in->p, 'S', n);
+    in->coloured = !in->bare_vertices && memchr(in->p, 'C', n);
+    in->normals = memchr(in->p, 'N', n);
     in->p += n;
     if (line_goes_on(in) && in->end - in->p >= 6 && !memcmp(in->p, "BINARY", 6))
         return vg_fail(in->e, VG_EINPUT, "%s is binary OFF, which is not supported: write it as text", in->subject);
