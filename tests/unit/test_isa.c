@@ -729,6 +729,12 @@ static void check_dots(void)
             for (size_t i = 0; i < n; i++) sum += rows[k * n + i] * x[i];
             CHECK_NEAR(y[k], sum, 1e-14 * MOST);
         }
+        double to[MOST + 1];
+        for (size_t i = 0; i <= n; i++) to[i] = wave(900 + i);
+        vgi_rig_kernel_now()->add_rows(rows, x, y, n, to);
+        for (size_t i = 0; i < n; i++)
+            CHECK_NEAR(to[i], wave(900 + i) + y[0] * rows[i] + y[1] * rows[n + i] + y[2] * rows[2 * n + i] + y[3] * x[i], 1e-12);
+        CHECK(to[n] == wave(900 + n));
     }
 }
 

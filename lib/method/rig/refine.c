@@ -234,13 +234,6 @@ static void place_columns(judging *x, size_t k, const double *transforms)
     }
 }
 
-/* to += sum of c[i] times row i of four columns, the last of them given apart. */
-static void add_four(const double *columns, const double *last, size_t width, const double c[4], double *to)
-{
-    for (size_t q = 0; q < width; q++)
-        to[q] += c[0] * columns[q] + c[1] * columns[width + q] + c[2] * columns[2 * width + q] + c[3] * last[q];
-}
-
 static void skin_vertex(const judging *x, size_t v, double *to)
 {
     const vg_rig *r = x->x->rig;
@@ -250,7 +243,7 @@ static void skin_vertex(const judging *x, size_t v, double *to)
     for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
         double w = r->skin_weight[s];
         const double c[4] = {w * p[0], w * p[1], w * p[2], w}, *of = x->columns + 4 * r->skin_bone[s] * width;
-        if (w > 0) add_four(of, of + 3 * width, width, c, to);
+        if (w > 0) vgi_rig_kernel_now()->add_rows(of, of + 3 * width, c, width, to);
     }
 }
 
@@ -265,7 +258,8 @@ static void judge_vertex(const judging *x, size_t v, const double *base)
         memcpy(tried, base, width * sizeof *tried);
         for (size_t b = 0; b < x->t->count[v]; b++) {
             size_t j = x->t->bone[v * AROUND + b];
-            add_four(x->columns + 4 * j * width, x->joints + j * width, width, x->t->add + (v * n + i) * MOST + 4 * b, tried);
+            vgi_rig_kernel_now()->add_rows(x->columns + 4 * j * width, x->joints + j * width,
+                                            x->t->add + (v * n + i) * MOST + 4 * b, width, tried);
         }
         for (size_t q = 0; q < width; q++) {
             double s = skin[q] - x->at[q / 3][3 * v + q % 3], d = tried[q] - skin[q];

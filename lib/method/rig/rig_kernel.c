@@ -29,4 +29,14 @@ static void dots(const double *rows, const double *x, size_t n, double y[4])
     }
 }
 
-const vgi_rig_kernel VGI_OF_SET(vgi_rig_kernel) = {dots};
+static void add_rows(const double *rows, const double *last, const double c[4], size_t n, double *y)
+{
+    size_t whole = n - n % VGI_WIDTH;
+    vgi_wide a = vgi_same(c[0]), b = vgi_same(c[1]), d = vgi_same(c[2]), e = vgi_same(c[3]);
+    for (size_t i = 0; i < whole; i += VGI_WIDTH)
+        vgi_store(y + i, vgi_load(y + i) + (a * vgi_load(rows + i) + b * vgi_load(rows + n + i) + d * vgi_load(rows + 2 * n + i) +
+                                            e * vgi_load(last + i)));
+    for (size_t i = whole; i < n; i++) y[i] += c[0] * rows[i] + c[1] * rows[n + i] + c[2] * rows[2 * n + i] + c[3] * last[i];
+}
+
+const vgi_rig_kernel VGI_OF_SET(vgi_rig_kernel) = {dots, add_rows};
