@@ -294,8 +294,20 @@ static void guide_over_pose(sequence *t, const size_t keys[3], double (*given)[N
     CHECK(g == NULL);
 }
 
+/* The mean of sum w_j e_j over the points, by weights in time between keys 2, 6 and 9. */
+static void shift_in_time(const sequence *u, const sequence *truth, size_t k, double shift[3])
+{
+    static const size_t keys[] = {2, 6, 9};
+    size_t after = k <= 2 ? 0 : k <= 6 ? 1 : 2, before = after && k < 9 ? after - 1 : after;
+    double w = after == before ? 1 : (double)(k - keys[before]) / (double)(keys[after] - keys[before]);
+    memset(shift, 0, 3 * sizeof *shift);
+    for (size_t i = 0; i < N; i++)
+        shift[i % 3] += (w * (truth->at[keys[after]][i] - u->at[keys[after]][i]) +
+                         (1 - w) * (truth->at[keys[before]][i] - u->at[keys[before]][i])) / POINTS;
+}
+
 /* Poses that are affine combinations of the keys', by weights that do not follow time: an error that is affine in the pose is
- * corrected completely. */
+ * corrected completely, but for the mean, which follows time. */
 static void test_over_pose(void)
 {
     static const size_t keys[] = {2, 6, 9};
@@ -316,8 +328,12 @@ static void test_over_pose(void)
     t = u;
     guide_over_pose(&t, keys, given);
     for (size_t j = 0; j < 3; j++) CHECK(!memcmp(t.at[keys[j]], given[j], sizeof given[j]));
-    for (size_t k = 0; k < FRAMES; k++)
-        for (size_t i = 0; i < N; i++) CHECK(fabs(t.at[k][i] - truth.at[k][i]) < 1e-12);
+    for (size_t k = 0; k < FRAMES; k++) {
+        double shift[3], mean[3] = {0};
+        shift_in_time(&u, &truth, k, shift);
+        for (size_t i = 0; i < N; i++) mean[i % 3] += (truth.at[k][i] - u.at[k][i]) / POINTS;
+        for (size_t i = 0; i < N; i++) CHECK(fabs(t.at[k][i] - shift[i % 3] - truth.at[k][i] + mean[i % 3]) < 1e-12);
+    }
 }
 
 /* Two keys of one pose: in time, to rounding. A pose far beyond the keys, with weights -99, 100, 0 over the pose and 0, 0.6, 0.4
@@ -338,10 +354,11 @@ static void test_over_pose_falls_back(void)
     u = make_sequence();
     for (size_t i = 0; i < N; i++) u.at[7][i] = u.at[1][i] + 100 * (u.at[5][i] - u.at[1][i]);
     for (size_t j = 0; j < 3; j++)
-        for (size_t i = 0; i < N; i++) given[j][i] = u.at[keys[j]][i] + (j == 1 ? -1 : 1);
+        for (size_t i = 0; i < N; i++) given[j][i] = u.at[keys[j]][i] + (j == 1 ? -1 : 1) * (i < 3 ? POINTS - 1.0 : -1);
     t = u;
     guide_over_pose(&t, keys, given);
-    for (size_t i = 0; i < N; i++) CHECK(fabs(t.at[7][i] - u.at[7][i] + 0.2 + 198.8 / 198) < 1e-8);
+    for (size_t i = 0; i < N; i++)
+        CHECK(fabs((t.at[7][i] - u.at[7][i]) / (i < 3 ? POINTS - 1.0 : -1) + 0.2 + 198.8 / 198) < 1e-8);
 }
 
 TESTS({"keys, second differences, relaxation", test_keys}, {"one offset for all", test_same_offset},

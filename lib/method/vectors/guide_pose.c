@@ -2,7 +2,8 @@
  *
  * The error of a transferred sequence depends on the pose, not on time. V_k are the poses of the keys and V that of a
  * frame, centroids at 0. The weights w (sum 1) make sum w_k V_k the nearest point to V in the affine span of the
- * keys; the frame moves by sum w_k e_k. Weights in time (poisson.c) are mixed in where sum |w_k| would exceed 2, and
+ * keys; the frame moves by sum w_k e_k, e_k without its mean. The means, which tell where the body is, go by weights in
+ * time: a way that drifts does not depend on the pose. Weights in time (poisson.c) are mixed in where sum |w_k| would exceed 2, and
  * used alone where the keys' poses are affinely dependent (two of them are alike). Guidance in time is in poisson.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/lapack.h"
@@ -18,7 +19,8 @@ static const double MOST_WEIGHT = 2;    /* largest sum of |w| */
 
 typedef struct pose_key {
     uint64_t frame;
-    double *given, *offset; /* n each */
+    double *given, *offset; /* n each; the offset without its mean */
+    double shift[3];        /* the mean of the offset */
     double *from_first;     /* n: V_k - V_0; for the first key, V_0 */
     double centre[3];       /* of the pose */
 } pose_key;
@@ -110,6 +112,8 @@ void vg_pose_guide_key(vg_pose_guide *g, uint64_t frame, const double *pose, con
     }
     for (size_t j = 1; j <= g->nkeys; j++)
         g->product[(g->nkeys - 1) * g->cap + j - 1] = vgi_inner(x->from_first, g->key[j].from_first, g->n);
+    vg_centroid(x->offset, g->n / 3, x->shift);
+    for (size_t i = 0; i < g->n; i++) x->offset[i] -= x->shift[i % 3];
     g->nkeys++, g->factored = false;
 }
 
@@ -177,6 +181,7 @@ void vg_pose_guide_apply(vg_pose_guide *g, uint64_t frame, double *pose)
     double share = share_of_pose(g);
     for (size_t k = 0; k < g->nkeys; k++) {
         double w = g->spans ? g->timed[k] + share * (g->weight[k] - g->timed[k]) : g->timed[k];
-        for (size_t i = 0; i < g->n && w != 0; i++) pose[i] += w * g->key[k].offset[i];
+        const pose_key *x = &g->key[k];
+        for (size_t i = 0; i < g->n; i++) pose[i] += w * x->offset[i] + g->timed[k] * x->shift[i % 3];
     }
 }
