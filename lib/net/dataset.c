@@ -211,7 +211,8 @@ static int find_basis(vgi_dataset *s, vg_network *n, size_t most, int threads, v
     if (!x) return VG_ENOMEM;
     for (size_t i = 0; i < s->train.n; i++)
         for (size_t t = s->train.at[i].first; t < s->train.at[i].end; t++) vgi_dataset_normalised(s, n, t, x + row++ * s->d);
-    if (vgi_basis_make(&b, x, frames, s->d, threads, e) < 0) return VG_ENOMEM;
+    int r = vgi_basis_make(&b, x, frames, s->d, threads, e);
+    if (r < 0) return r;
     while (s->rank < b.rank && s->rank < most && b.value[s->rank] > least_sigma * least_sigma * b.value[0]) s->rank++;
     n->rank = s->rank;
     n->mean = vgi_copy_array(b.mean, s->d, sizeof *b.mean, e);

@@ -234,8 +234,8 @@ static int choose_regression(vg_trainer *t, vg_err *e)
 static int fit_regressions(vg_trainer *t, vg_err *e)
 {
     vgi_frames fitted;
-    if (!t->net.damping && choose_regression(t, e) < 0) return VG_ENOMEM;
-    int r = vgi_spans_coordinates(&t->fitted, &t->data, &fitted, e);
+    int r = t->net.damping ? VG_OK : choose_regression(t, e);
+    if (r == VG_OK) r = vgi_spans_coordinates(&t->fitted, &t->data, &fitted, e);
     if (r < 0) return r;
     vgi_blas_alone();
     for (int back = 0; r == VG_OK && back < 2; back++) {
@@ -659,7 +659,8 @@ int vg_trainer_resume(vg_trainer *t, const vg_network *from, vg_err *e)
     if (from->model != n->model || from->direction != n->direction || from->nparameters != n->nparameters ||
         from->rank != n->rank || from->seed != n->seed || from->step != n->step)
         return vg_fail(e, VG_EINPUT, "it was trained with other options");
-    if (from->phase && !t->state.phase && begin_phase(t, false, e) < 0) return VG_ENOMEM;
+    int r = from->phase && !t->state.phase ? begin_phase(t, false, e) : VG_OK;
+    if (r < 0) return r;
     memcpy(t->net.parameters, from->parameters, all * sizeof *t->best);
     memcpy(t->moments, from->moments, 2 * all * sizeof *t->best);
     memcpy(t->best, from->best, all * sizeof *t->best);
