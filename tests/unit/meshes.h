@@ -111,7 +111,7 @@ static inline vg_head make_torus(uint32_t u, uint32_t v)
 }
 
 /* A sheet in the plane z = 0, of n x n uneven quads, stretched by a along x and b along y. */
-static inline vg_head make_sheet(uint32_t n, double a, double b)
+static inline vg_head make_uneven_sheet(uint32_t n, double a, double b)
 {
     vg_head h = new_shape();
     for (uint32_t i = 0; i <= n; i++)

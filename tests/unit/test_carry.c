@@ -179,7 +179,7 @@ static void unmatched_is_rigid(void)
 static void offset_adds_growth(void)
 {
     static const double p = 1.6, q = 0.7, c = 0.6, s = 0.8;
-    vg_head h = make_sheet(6, 1, 1), other = make_sheet(6, 0.5, 0.9);
+    vg_head h = make_uneven_sheet(6, 1, 1), other = make_uneven_sheet(6, 0.5, 0.9);
     size_t nv = h.body.mesh.nv;
     vg_correspondence k = chance_pairs(&h.body.mesh, &other.body.mesh, 2, true);
     for (size_t f = 0; f < h.body.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = (uint32_t)f;

@@ -606,7 +606,7 @@ static void test_gradient(void)
 static void test_offset(void)
 {
     static const double p = 1.7, q = 0.6, a = 0.8, b = 1.3, c = 0.8, s = 0.6; /* the sheet turns about x */
-    vg_head h = make_sheet(5, 1, 1), other = make_sheet(5, a, b);
+    vg_head h = make_uneven_sheet(5, 1, 1), other = make_uneven_sheet(5, a, b);
     vg_graph *g = graph_of(&h);
     size_t nv = h.body.mesh.nv, corners = vg_graph_corners(g);
     double *pose = room(3 * nv, sizeof *pose), *w = room(3 * corners, sizeof *w), worst = 0, source2 = 0, target2 = 0;
