@@ -200,7 +200,7 @@ $(B)/bench/%: $(B)/tests/bench/%.o $(B)/libvg.a
 # with CONFIG=fuzz the engine brings main; otherwise replay.c does, and the same files run over the corpora
 ifeq ($(CONFIG),fuzz)
 FUZZ_MAIN :=
-FUZZ_LINK := -fsanitize=fuzzer
+FUZZ_LINK := -fsanitize=fuzzer -fsanitize-link-c++-runtime
 else
 FUZZ_MAIN := $(B)/tests/fuzz/replay.o
 FUZZ_LINK :=

@@ -59,9 +59,9 @@ int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e)
     int r = VG_OK;
     for (size_t f = 0; f < m->nf && r == VG_OK; f++) {
         size_t size = m->start[f + 1] - m->start[f];
-        const uint32_t *vert = m->vert + m->start[f];
         if (m->start[f + 1] < m->start[f] || size < 2)
             return free(sorted), vg_fail(e, VG_EINPUT, "%s: face %zu has fewer than 2 vertices", subject, f);
+        const uint32_t *vert = m->vert + m->start[f]; /* NULL only without corners */
         for (size_t i = 0; i < size; i++)
             if (vert[i] >= m->nv)
                 return free(sorted),
