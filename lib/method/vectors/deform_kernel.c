@@ -105,6 +105,26 @@ VGI_INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, siz
     }
 }
 
+/* The rotation of a triangle without iteration: y maps plane to plane, q the normal of one and n of the other, and for a
+ * map of planes A the sum of A and its cofactors is a multiple of the rotation of its polar decomposition. */
+VGI_INLINE void turn_triangle(const double q[3], vec n, const vec y[3], vgi_wide *turn)
+{
+    vec p[3], z[3];
+    vgi_wide square = {0};
+#pragma GCC unroll 3
+    for (int k = 0; k < 3; k++) {
+        int next = (k + 1) % 3, last = (k + 2) % 3;
+        z[k] = add(times(y[next], vgi_same(q[last])), times(y[last], vgi_same(-q[next])));
+        p[k] = add(y[k], cross(z[k], n));
+        square += dot(p[k], p[k]);
+    }
+    square = vgi_roots(2.0 / square);
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++)
+#pragma GCC unroll 3
+        for (int k = 0; k < 3; k++) turn[3 * i + k] = p[k].at[i] * square + n.at[i] * vgi_same(q[k]);
+}
+
 /* The rotation of the face: that of its deformation gradient. */
 VGI_INLINE void turn_face(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vec n, const vec *w, vgi_wide *turn)
 {
@@ -112,6 +132,10 @@ VGI_INLINE void turn_face(const vgi_transfer *t, size_t f, uint32_t begin, size_
     vgi_wide m[9];
     sum_products(t, begin, r, w, y);
     const double *q = t->gradient_face[f].q;
+    if (r == 3) {
+        turn_triangle(q, n, y, turn);
+        return;
+    }
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++)
 #pragma GCC unroll 3
