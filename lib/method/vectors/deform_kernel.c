@@ -153,10 +153,14 @@ VGI_INLINE vgi_mask by_offset(const vgi_transfer *t, size_t f, uint32_t begin, s
     for (size_t i = 0; i < r; i++) {
         const double *k = t->coordinates + 3 * (size_t)(begin + i), *b = t->gradient[begin + i].b;
         vgi_wide d2 = dot(w[i], w[i]);
-        vec u = times(w[i], vgi_roots(1.0 / d2)), m = add(n, times(u, -dot(n, u)));
-        vgi_wide m2 = dot(m, m);
-        bad |= ~(d2 > vgi_same(t->shortest2)) | ~(m2 > vgi_same(flat2));
-        m = times(m, vgi_roots(1.0 / m2));
+        vec u = times(w[i], vgi_roots(1.0 / d2)), m = n;
+        bad |= ~(d2 > vgi_same(t->shortest2));
+        if (r > 3) { /* the vectors of a triangle are perpendicular to n */
+            m = add(n, times(u, -dot(n, u)));
+            vgi_wide m2 = dot(m, m);
+            bad |= ~(m2 > vgi_same(flat2));
+            m = times(m, vgi_roots(1.0 / m2));
+        }
         vec side = cross(m, u);
         w[i] = times(w[i], scale);
 #pragma GCC unroll 3
