@@ -105,7 +105,14 @@ VGI_INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, siz
     }
 }
 
-/* The rotation of a triangle without iteration: y maps plane to plane, q the normal of one and n of the other, and for a
+/* Whether all vectors of the face are perpendicular to its normal: those of three vertices are. Vectors that come as such
+ * need not fit together. */
+VGI_INLINE bool is_flat(const vgi_transfer *t, size_t r)
+{
+    return r == 3 && t->vertices;
+}
+
+/* The rotation of such a triangle without iteration: y maps plane to plane, q the normal of one and n of the other, and for a
  * map of planes A the sum of A and its cofactors is a multiple of the rotation of its polar decomposition. */
 VGI_INLINE void turn_triangle(const double q[3], vec n, const vec y[3], vgi_wide *turn)
 {
@@ -132,7 +139,7 @@ VGI_INLINE void turn_face(const vgi_transfer *t, size_t f, uint32_t begin, size_
     vgi_wide m[9];
     sum_products(t, begin, r, w, y);
     const double *q = t->gradient_face[f].q;
-    if (r == 3) {
+    if (is_flat(t, r)) {
         turn_triangle(q, n, y, turn);
         return;
     }
@@ -155,7 +162,7 @@ VGI_INLINE vgi_mask by_offset(const vgi_transfer *t, size_t f, uint32_t begin, s
         vgi_wide d2 = dot(w[i], w[i]);
         vec u = times(w[i], vgi_roots(1.0 / d2)), m = n;
         bad |= ~(d2 > vgi_same(t->shortest2));
-        if (r > 3) { /* the vectors of a triangle are perpendicular to n */
+        if (!is_flat(t, r)) {
             m = add(n, times(u, -dot(n, u)));
             vgi_wide m2 = dot(m, m);
             bad |= ~(m2 > vgi_same(flat2));
