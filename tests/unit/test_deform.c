@@ -634,6 +634,86 @@ static void test_offset(void)
     vg_head_clear(&h), vg_head_clear(&other);
 }
 
+/* Rotation of the polar decomposition of M: the limit of (M + M^-T) / 2. */
+static void polar(double M[9])
+{
+    for (int round = 0; round < 60; round++) {
+        double c[9], det;
+        for (size_t i = 0; i < 3; i++) cross(M + 3 * ((i + 1) % 3), M + 3 * ((i + 2) % 3), c + 3 * i);
+        det = dot(M, c, 3);
+        for (int k = 0; k < 9; k++) M[k] = (M[k] + c[k] / det) / 2;
+    }
+}
+
+/* Columns: the direction of v, and of what n has perpendicular to it, and their product. */
+static void corner_frame(const double *v, const double n[3], double f[9])
+{
+    double u[3], m[3], side[3], length = sqrt(dot(v, v, 3)), along = dot(n, v, 3) / length;
+    for (int k = 0; k < 3; k++) u[k] = v[k] / length, m[k] = n[k] - along * u[k];
+    length = sqrt(dot(m, m, 3));
+    for (int k = 0; k < 3; k++) m[k] /= length;
+    cross(m, u, side);
+    for (int k = 0; k < 3; k++) f[3 * k] = u[k], f[3 * k + 1] = side[k], f[3 * k + 2] = m[k];
+}
+
+/* scale d + (R + J) b / 2, b = t - scale r, R the rotation of the face and J that of the corner (MATH 5) */
+static void by_offset(const double *r, const double *d, const double *t, size_t n, double scale, double *wanted)
+{
+    double A[9], M[9], R[9], nr[3], nd[3], h = dot(r, r, 3 * n) / 2;
+    newell(r, n, nr);
+    newell(d, n, nd);
+    for (int k = 0; k < 9; k++) A[k] = h * nr[k / 3] * nr[k % 3], M[k] = h * nd[k / 3] * nr[k % 3];
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < 9; k++) A[k] += r[3 * i + k / 3] * r[3 * i + k % 3], M[k] += d[3 * i + k / 3] * r[3 * i + k % 3];
+    for (size_t k = 0; k < 3; k++) solve3(A, M + 3 * k, R + 3 * k); /* A is symmetric */
+    polar(R);
+    for (size_t i = 0; i < n; i++) {
+        double from[9], to[9], b[3], own[3] = {0, 0, 0};
+        for (size_t k = 0; k < 3; k++) b[k] = t[3 * i + k] - scale * r[3 * i + k];
+        corner_frame(r + 3 * i, nr, from);
+        corner_frame(d + 3 * i, nd, to);
+        for (size_t a = 0; a < 3; a++)
+            for (size_t k = 0; k < 3; k++) own[a] += from[3 * k + a] * b[k];
+        for (size_t k = 0; k < 3; k++) wanted[3 * i + k] = scale * d[3 * i + k] + (dot(R + 3 * k, b, 3) + dot(to + 3 * k, own, 3)) / 2;
+    }
+}
+
+/* Vertices, and vectors that no vertices have: those of a face are in no plane and have a sum. */
+static void test_offset_of_any(void)
+{
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        vg_graph *g = graph_of(&h);
+        size_t corners = vg_graph_corners(g), last = 3 * (size_t)g->faces.start[g->faces.nf - g->nlinks];
+        double *pose = warp(h.body.reference, g->faces.nv, 0.6), *target = warp(h.body.reference, g->faces.nv, -0.3);
+        double *r = vectors_of(g, h.body.reference), *p = vectors_of(g, pose), *t = vectors_of(g, target);
+        double *w = room(3 * corners, sizeof *w), *want = room(3 * g->max_corners, sizeof *want), D = vg_diagonal(target, g->faces.nv);
+        double scale = sqrt(dot(t, t, last) / dot(r, r, last)), worst = 0;
+        vg_deformer *d = deformer(g, h.body.reference, 1);
+        aim_by(d, g, target, VG_BY_OFFSET);
+        for (int apart = 0; apart < 2; apart++) {
+            for (size_t c = 0; c < corners && apart; c++) {
+                double size = 0.2 * sqrt(dot(p + 3 * c, p + 3 * c, 3));
+                for (int k = 0; k < 3; k++) p[3 * c + k] += size * noise();
+            }
+            vg_deformer_transfer(d, 1, apart ? VG_VECTORS : VG_VERTICES, CONST(apart ? &p : &pose), &w);
+            for (size_t f = 0; f < g->faces.nf - g->nlinks; f++) {
+                size_t c = 3 * (size_t)g->faces.start[f], n = g->faces.start[f + 1] - g->faces.start[f];
+                if (n < 3) continue;
+                by_offset(r + c, p + c, t + c, n, scale, want);
+                worst = fmax(worst, farthest(w + c, want, n));
+            }
+        }
+        if (!(worst <= 1e-12 * D)) printf("%s:\n", name);
+        CHECK_NEAR(worst, 0, 1e-12 * D);
+        vg_deformer_free(&d);
+        free(pose), free(target), free(r), free(p), free(t), free(w), free(want);
+        vg_graph_free(&g);
+        vg_head_clear(&h);
+    }
+}
+
 /* ---- target = source, through the solve ---- */
 
 static double self_transfer(vg_head *h, size_t n, const double *const *poses, vg_method method, int threads)
@@ -705,4 +785,5 @@ TESTS({"Frames and Rodrigues as the formulas have them", test_formulas}, {"a J r
       {"where degenerate begins", test_where_degenerate_begins},
       {"nothing but finite numbers", test_nothing_but_finite},
       {"gradient and blend as the formulas have them", test_gradient},
-      {"offset on a flat sheet as the formula has it", test_offset}, {"onto itself", test_onto_itself})
+      {"offset on a flat sheet as the formula has it", test_offset},
+      {"offset of vertices and of any vectors as the formula has it", test_offset_of_any}, {"onto itself", test_onto_itself})
