@@ -92,6 +92,52 @@ END
     [ "$(cat counts)" = "0 0" ]
 }
 
+# A skinned mesh below a moved node, and the other one with joints but without a skin: the validator warns of both.
+@test "what others warn of is mended: a skinned mesh below a node, joints without a skin; nothing unused stays" {
+    py <<'END'
+import make_character
+m, d = make_character.character()
+d["nodes"][3]["translation"] = [9, 9, 9]
+d["nodes"].append({"name": "Frame", "scale": [2, 2, 2], "children": [3]})
+d["scenes"][0]["nodes"] = [0, 6, 4]
+free = d["meshes"][1]["primitives"][0]["attributes"]
+for key in "JOINTS_0", "WEIGHTS_0":
+    free[key] = d["meshes"][0]["primitives"][0]["attributes"][key]
+open("warned.glb", "wb").write(make_character.glb(d, m.data))
+END
+    make_in
+    must vg-encode in.glb -o in.vgs
+    pipe 'vg-encode warned.glb | vg-diff -t 1e-7 in.vgs -'
+    must vg-decode --max-targets 1000 warned.glb -o out.glb
+    pipe 'vg-encode out.glb | vg-diff -t 1e-6 in.vgs -'
+    must vg-decode -q --quantize warned.glb -o small.glb
+    py <<'END'
+import json, struct
+for name in "out.glb", "small.glb":
+    b = open(name, "rb").read()
+    n, = struct.unpack("<I", b[12:16])
+    g = json.loads(b[20:20 + n])
+    assert g["nodes"][3]["name"] == "Body" and "translation" not in g["nodes"][3] and "children" not in g["nodes"][6]
+    assert g["scenes"][0]["nodes"] == [0, 6, 3, 4 if name == "out.glb" else 7], g["scenes"]
+    assert "JOINTS_0" in g["meshes"][0]["primitives"][0]["attributes"]
+    assert "JOINTS_0" not in g["meshes"][1]["primitives"][0]["attributes"]
+    used = [i for m in g["meshes"] for p in m["primitives"] for i in [*p["attributes"].values(), p["indices"],
+            *(x for t in p["targets"] for x in t.values())]]
+    used += [s[k] for a in g["animations"] for s in a["samplers"] for k in ("input", "output")]
+    used += [s["inverseBindMatrices"] for s in g["skins"]]
+    assert set(used) == set(range(len(g["accessors"]))), name
+    views = [v[k]["bufferView"] for a in g["accessors"] if "sparse" in a for v in [a["sparse"]] for k in ("indices", "values")]
+    views += [a["bufferView"] for a in g["accessors"] if "bufferView" in a] + [i["bufferView"] for i in g["images"]]
+    assert set(views) == set(range(len(g["bufferViews"]))), name
+END
+    command -v node >/dev/null && node -e 'require("gltf-validator")' 2>/dev/null || return 0
+    for file in out small; do
+        node -e 'require("gltf-validator").validateBytes(new Uint8Array(require("fs").readFileSync(process.argv[1]))).then(r =>
+            console.log(r.issues.numErrors, r.issues.numWarnings))' $file.glb >counts
+        [ "$(cat counts)" = "0 0" ]
+    done
+}
+
 @test "the file's size and error are said when frames are mixed, and with -v" {
     must vg-decode "$DATA/horse-run.tar.xz" -o run.glb
     must_warn vg-decode -v "$DATA/horse-run.tar.xz" -o run.glb

@@ -2,6 +2,8 @@
  * images, cameras and lights are unchanged, and each node that shows a mesh gets a separate mesh, because each moves
  * independently. Bytes and accessors are in gltf_morph.c, positions of vertices in gltf_character.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_prune.h"
+#include "io/gltf_roots.h"
 #include "io/gltf_write.h"
 
 #include <stdlib.h>
@@ -46,6 +48,71 @@ int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say(&w->json, e, ",\n");
 }
 
+/* ---- what goes ---- */
+
+/* Joints and weights of vertices without a skin mean nothing, and the format does not allow them. */
+static void drop_influences(vgi_json *attributes)
+{
+    for (const char *key = vgi_json_key(attributes, NULL), *next; key; key = next) {
+        next = vgi_json_key(attributes, key);
+        if (!strncmp(key, "JOINTS_", 7) || !strncmp(key, "WEIGHTS_", 8)) vgi_json_drop(attributes, key);
+    }
+}
+
+static void trim_primitives(vgi_json *mesh, bool skinned)
+{
+    vgi_json *primitives = vgi_json_inner(mesh, "primitives");
+    for (size_t i = 0; i < vgi_json_count(primitives); i++) {
+        vgi_json *primitive = vgi_json_inner_at(primitives, i);
+        vgi_json_drop(primitive, "targets");
+        if (!skinned) drop_influences(vgi_json_inner(primitive, "attributes"));
+    }
+}
+
+static bool shows_mesh(const vgi_gltf_scene *x, size_t node, size_t *mesh)
+{
+    uint64_t number = 0;
+    if (!x->nodes[node].shown || !vgi_json_whole(vgi_json_get(x->nodes[node].json, "mesh"), &number)) return false;
+    *mesh = (size_t)number;
+    return true;
+}
+
+/* What the nodes that show meshes use. */
+typedef struct uses {
+    bool *meshes, *skinned; /* skinned: meshes that a node shows with a skin */
+    bool *bound;            /* skins of a single node */
+} uses;
+
+static void find_uses(const vgi_gltf_scene *x, uses *u)
+{
+    for (size_t i = 0; i < x->nnodes; i++) {
+        size_t mesh;
+        if (!shows_mesh(x, i, &mesh)) continue;
+        u->meshes[mesh] = true;
+        u->skinned[mesh] |= vgi_json_get(x->nodes[i].json, "skin") != NULL;
+    }
+    for (size_t s = 0; s < x->nskins; s++) u->bound[s] = vgi_gltf_users_of(x->g.json, s) == 1;
+}
+
+int vgi_gltf_trim_cast(vgi_gltf_writing *w, bool quantized, vg_err *e)
+{
+    vgi_gltf_scene *x = &w->character->scene;
+    vgi_json *meshes = vgi_json_inner(x->g.json, "meshes");
+    const size_t n = vgi_json_count(meshes);
+    uses u = {vgi_array(n, 1, e), vgi_array(n, 1, e), vgi_array(x->nskins, 1, e)};
+    int r = u.meshes && u.skinned && u.bound ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) find_uses(x, &u);
+    for (size_t i = 0; i < x->nparts; i++) x->parts[i].targets = NULL;
+    for (size_t m = 0; m < n && r == VG_OK; m++) trim_primitives(vgi_json_inner_at(meshes, m), u.skinned[m]);
+    vgi_json_drop(x->g.json, "animations");
+    const vgi_gltf_pruned pruned = {u.meshes, quantized ? u.bound : NULL, quantized || !w->character->kept};
+    if (r == VG_OK) r = vgi_gltf_prune(&x->g, &pruned, &w->asset, e);
+    free(u.meshes);
+    free(u.skinned);
+    free(u.bound);
+    return r;
+}
+
 /* ---- meshes ---- */
 
 static int put_number(vgi_json *object, const char *key, size_t x, vg_err *e)
@@ -68,13 +135,15 @@ static int add_targets(vgi_json *primitive, const vgi_gltf_cast *k, size_t l, vg
     return r;
 }
 
-static int add_primitive(vgi_json *primitives, const vgi_gltf_piece *piece, const vgi_gltf_cast *k, vg_err *e)
+static int add_primitive(vgi_json *primitives, const vgi_gltf_scene *x, const vgi_gltf_piece *piece, const vgi_gltf_cast *k,
+                         vg_err *e)
 {
     const vgi_gltf_list *l = &k->lists[piece->part];
     vgi_json *primitive = vgi_json_copy(piece->json, e);
     int r = vgi_json_add(primitives, primitive, e);
     if (r < 0) return r;
     vgi_json *attributes = vgi_json_inner(primitive, "attributes");
+    if (x->parts[piece->part].skin == VGI_GLTF_NONE) drop_influences(attributes);
     r = put_number(attributes, "POSITION", l->position, e);
     if (r == VG_OK && l->normals) r = put_number(attributes, "NORMAL", l->normal, e);
     return r < 0 ? r : add_targets(primitive, k, piece->part, e);
@@ -103,7 +172,7 @@ static int add_mesh(vgi_json *meshes, const vgi_gltf_scene *x, size_t node, cons
     if (r == VG_OK) r = vgi_json_add(meshes, mesh, e);
     if (r == VG_OK) r = vgi_json_put(mesh, "primitives", primitives = vgi_json_array(e), e);
     for (size_t i = 0; i < x->npieces && r == VG_OK; i++)
-        if (x->parts[x->pieces[i].part].node == node) r = add_primitive(primitives, &x->pieces[i], k, e);
+        if (x->parts[x->pieces[i].part].node == node) r = add_primitive(primitives, x, &x->pieces[i], k, e);
     if (r == VG_OK && k->targets) r = add_weights(mesh, k->targets, e);
     return r == VG_OK && k->targets ? add_names(mesh, k->names, e) : r;
 }
@@ -117,20 +186,16 @@ static void drop_instancing(vgi_json *holder)
     if (vgi_json_get(holder, key) && !vgi_json_key(vgi_json_get(holder, key), NULL)) vgi_json_drop(holder, key);
 }
 
-static bool shows_mesh(const vgi_gltf_scene *x, size_t node)
-{
-    return x->nodes[node].shown && vgi_json_get(x->nodes[node].json, "mesh");
-}
-
 /* A separate mesh for each node that shows one; other scenes get none. */
 static int cast_nodes(vgi_json *doc, const vgi_gltf_scene *x, const vgi_gltf_cast *k, vg_err *e)
 {
     vgi_json *nodes = vgi_json_inner(doc, "nodes"), *meshes = vgi_json_array(e);
+    size_t mesh;
     int r = vgi_json_put(doc, "meshes", meshes, e);
     for (size_t i = 0; i < x->nnodes && r == VG_OK; i++) {
         vgi_json *node = vgi_json_inner_at(nodes, i);
         drop_instancing(node);
-        if (!shows_mesh(x, i)) {
+        if (!shows_mesh(x, i, &mesh)) {
             vgi_json_drop(node, "mesh");
             vgi_json_drop(node, "skin");
             continue;
@@ -179,6 +244,7 @@ int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e)
     if (r == VG_OK) r = drop_from_list(doc, "extensionsUsed", instancing, e);
     if (r == VG_OK) r = drop_from_list(doc, "extensionsRequired", instancing, e);
     if (r == VG_OK) r = cast_nodes(doc, &w->character->scene, k, e);
+    if (r == VG_OK) r = vgi_gltf_raise_skins(&w->character->scene, doc, e);
     if (r == VG_OK && k->ngrids) r = vgi_gltf_put_grids(doc, k->grids, k->ngrids, e);
     if (r == VG_OK) r = say_members(w, doc, e);
     vgi_json_free(&doc);

@@ -179,13 +179,25 @@ static int put_above(vgi_json *doc, const vgi_gltf_grid *g, vg_err *e)
     return r < 0 ? r : add_child(copy, g->node, e);
 }
 
-/* A skin of its own, with the grid in its inverse bind matrices. */
+size_t vgi_gltf_users_of(const vgi_json *document, size_t skin)
+{
+    const vgi_json *nodes = vgi_json_get(document, "nodes");
+    size_t n = 0;
+    for (size_t i = 0; i < vgi_json_count(nodes); i++) {
+        uint64_t of;
+        n += vgi_json_whole(vgi_json_get(vgi_json_at(nodes, i), "skin"), &of) && of == skin;
+    }
+    return n;
+}
+
+/* A skin of its own, with the grid in its inverse bind matrices; the present one if no other node has it. */
 static int put_skin(vgi_json *doc, const vgi_gltf_grid *g, vg_err *e)
 {
     vgi_json *node = vgi_json_inner_at(vgi_json_inner(doc, "nodes"), g->node), *skins = vgi_json_inner(doc, "skins");
-    const size_t number = vgi_json_count(skins);
-    vgi_json *skin = vgi_json_copy(vgi_json_at(skins, g->skin), e);
-    int r = vgi_json_add(skins, skin, e);
+    const bool alone = vgi_gltf_users_of(doc, g->skin) == 1;
+    const size_t number = alone ? g->skin : vgi_json_count(skins);
+    vgi_json *skin = alone ? vgi_json_inner_at(skins, number) : vgi_json_copy(vgi_json_at(skins, g->skin), e);
+    int r = alone ? VG_OK : vgi_json_add(skins, skin, e);
     if (r == VG_OK) r = vgi_json_put(skin, "inverseBindMatrices", vgi_json_of_whole(g->inverse, e), e);
     return r < 0 ? r : vgi_json_put(node, "skin", vgi_json_of_whole(number, e), e);
 }

@@ -32,4 +32,6 @@ bool vgi_gltf_grid_bind(const vgi_gltf_grid *g, const vgi_gltf_skin *k, float *t
 /* vgi_gltf_put_grids: nodes and skins of a character's document apply the grids; it requires the extension. */
 int vgi_gltf_put_grids(vgi_json *doc, const vgi_gltf_grid *grids, size_t n, vg_err *e) VG_MUST_CHECK;
 
+size_t vgi_gltf_users_of(const vgi_json *document, size_t skin); /* nodes with this skin */
+
 #endif

@@ -90,7 +90,7 @@ int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi
     vgi_gltf_writing *w = *state = vgi_array(1, sizeof *w, e);
     if (!w) return VG_ENOMEM;
     w->manner = h->kind == VG_TRANSFORMS ? &vgi_gltf_by_skin : &vgi_gltf_by_morphs;
-    w->out = out, w->h = h, w->binary = binary, w->clip = o->name;
+    w->out = out, w->h = h, w->binary = binary, w->clip = o->name, w->quantized = o->quantize;
     w->spool.name = "temporary file";
     if ((w->spool.fd = vgi_nameless_file(e)) < 0) return w->spool.fd;
     int r = h->kind == VG_VERTICES ? open_character(w, e) : VG_OK;
@@ -294,12 +294,13 @@ static int emit_colours(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* Items of the character's file keep their numbers. */
+/* What is used of the character's file comes first. */
 static int describe_character(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_character *c = w->character;
-    int r = vgi_gltf_say_elements(c->scene.g.json, "bufferViews", &w->views, &w->nviews, e);
-    w->bytes = c->scene.g.nbuffers ? c->scene.g.buffers[0].size : 0;
+    int r = vgi_gltf_trim_cast(w, w->quantized, e);
+    if (r == VG_OK) r = vgi_gltf_say_elements(c->scene.g.json, "bufferViews", &w->views, &w->nviews, e);
+    w->bytes = w->asset.size;
     return r < 0 ? r : vgi_gltf_say_elements(c->scene.g.json, "accessors", &w->accessors, &w->naccessors, e);
 }
 
@@ -390,8 +391,9 @@ int vgi_gltf_emit_points(vgi_gltf_writing *w, vgi_gltf_numbers kind, const float
 
 static int emit_all(vgi_gltf_writing *w, vg_err *e)
 {
-    const vgi_gltf *g = w->character ? &w->character->scene.g : &w->library;
-    int r = g->nbuffers ? vgi_gltf_emit(w, g->buffers[0].data, g->buffers[0].size, e) : VG_OK;
+    const vgi_gltf *g = &w->library;
+    int r = vgi_gltf_emit(w, w->asset.data, w->asset.size, e);
+    if (r == VG_OK && g->nbuffers) r = vgi_gltf_emit(w, g->buffers[0].data, g->buffers[0].size, e);
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.triangles.data, w->shape.triangles.size, e);
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.lines.data, w->shape.lines.size, e);
     if (r == VG_OK && w->seams.uv) r = vgi_gltf_emit_singles(w, w->seams.uv, 2 * w->seams.n, e);
@@ -548,6 +550,7 @@ void vgi_gltf_release(void *state)
     vgi_gltf_shape_clear(&w->shape);
     vgi_gltf_seams_clear(&w->seams);
     vgi_gltf_normals_clear(&w->normals);
+    vg_bytes_clear(&w->asset);
     vg_bytes_clear(&w->json);
     vg_bytes_clear(&w->views);
     vg_bytes_clear(&w->accessors);

@@ -75,6 +75,8 @@ struct vgi_gltf_writing {
     size_t ntakes;
     bool times_lost;
     vgi_gltf_character *character; /* its nodes, materials and attributes are written; NULL: none */
+    bool quantized;
+    vg_bytes asset;            /* what of its bytes is written */
     vgi_gltf library;          /* of materials, without meshes; json NULL: none */
     vgi_name_set materials;    /* names of those written */
     vgi_gltf_seams seams;      /* vertices of the file */
@@ -118,6 +120,8 @@ typedef struct vgi_gltf_cast {
     const vgi_gltf_grid *grids;
     size_t ngrids;
 } vgi_gltf_cast;
+/* vgi_gltf_trim_cast: drop what is not written again from the document of the character, and gather the bytes of the rest. */
+int vgi_gltf_trim_cast(vgi_gltf_writing *w, bool quantized, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_say_elements: write the elements of a list of a file as text. */
 int vgi_gltf_say_elements(const vgi_json *document, const char *list, vg_bytes *to, size_t *n,

@@ -153,7 +153,7 @@ const report = {
 function names(gltf) {
     const out = [];
     gltf.scene.traverse(o => out.push(o.name));
-    return out;
+    return out.sort(); // a mesh with a skin may become a root
 }
 // Largest values over the animations; NaN stays.
 function worst(all) {
