@@ -70,15 +70,27 @@ static void note_aligned(const vg_driver *d, const vg_skeleton *s, const char *m
     if (n) cli_warn("the skeleton of the input rests in another pose than '%s': aligned %s; --align none leaves them", map, list);
 }
 
+static const char *axis_name(int axis)
+{
+    static const char *const names[] = {"-z", "-y", "-x", "", "x", "y", "z"};
+    return names[axis + 3];
+}
+
 static void note_stance(const vg_driver *d, const char *map)
 {
-    static const char *const axes[] = {"x", "y", "z"};
-    bool faces;
-    int up = vg_driver_stands(d, &faces);
-    if (up)
-        cli_warn("the skeleton of the input rests with %s%s up, unlike '%s': its motion is turned upright%s; --align none leaves it",
-                 up < 0 ? "-" : "", axes[(up < 0 ? -up : up) - 1], map, faces ? ", and it faces another way" : "");
-    else if (faces)
+    vg_stance s;
+    vg_driver_stands(d, &s);
+    const char *faces = s.faces ? ", and it faces another way" : "";
+    if (s.rests && s.moves)
+        cli_warn("the skeleton of the input rests with %s up, unlike '%s': its motion is turned upright%s; --align none leaves it",
+                 axis_name(s.rests), map, faces);
+    else if (s.moves)
+        cli_warn("the skeleton of the input moves with %s up, unlike '%s': its motion is turned upright%s; --align none leaves it",
+                 axis_name(s.moves), map, faces);
+    else if (s.rests)
+        cli_warn("the skeleton of the input rests with %s up, unlike '%s', but moves with the same axis up: only its rest pose is "
+                 "turned%s; --align none leaves it", axis_name(s.rests), map, faces);
+    else if (s.faces)
         cli_warn("the skeleton of the input rests facing another way than '%s', which is made up for; --align none leaves it", map);
 }
 
@@ -126,8 +138,7 @@ void driving_start(driving *d, const driving_options *o, const vg_rig *rig, cons
     if (missing)
         cli_warn("%zu of %zu bones have no matching joint of the skeleton: they follow their parents",
                  missing, rig->nbones);
-    note_stance(d->driver, name);
-    note_aligned(d->driver, &rig->skeleton, name);
+    d->rig = rig, d->name = name;
     free(chosen);
     free(partner);
 }
@@ -139,4 +150,15 @@ const double *driving_turns(vg_joint_fitter *fitter, const vg_frame *f)
     if (known) return turns;
     vg_joint_fitter_fit(fitter, f->values, NULL, NULL, &joint);
     return vg_joint_fitter_turns(fitter);
+}
+
+const double *driving_take(driving *d, const vg_frame *f)
+{
+    if (!d->begun) {
+        vg_driver_look(d->driver, f->values);
+        note_stance(d->driver, d->name);
+        note_aligned(d->driver, &d->rig->skeleton, d->name);
+    }
+    d->begun = true;
+    return driving_turns(d->fitter, f);
 }

@@ -15,11 +15,17 @@ typedef struct driving {
     vg_skeleton by;
     vg_joint_fitter *fitter; /* for frames that do not say how joints have turned */
     vg_driver *driver;       /* NULL: not started */
+    const vg_rig *rig;       /* borrowed, as is `name` */
+    const char *name;
+    bool begun;              /* a frame has been taken */
 } driving;
 
-/* driving_start: drive a rig (borrowed) by a skeleton (copied); warns of limbs it aligned and bones without a partner.
- * Messages call the rig `name`. */
+/* driving_start: drive a rig (borrowed) by a skeleton (copied); warns of bones without a partner. Messages call the rig `name`
+ * (borrowed). */
 void driving_start(driving *d, const driving_options *o, const vg_rig *rig, const char *name, const vg_skeleton *by);
+/* driving_take: the rotations of the joints in the next frame of the motion, as driving_turns. At the first one it finds which
+ * axis is up, and warns of this and of the limbs that are aligned. */
+const double *driving_take(driving *d, const vg_frame *f);
 /* driving_turns: the rotations of the joints in a frame: those it has, or fitted to the positions. Borrowed until the next
  * call. */
 const double *driving_turns(vg_joint_fitter *fitter, const vg_frame *f);

@@ -46,7 +46,7 @@ void joint_transfer_apply(joint_transfer *t, const vg_frame *in, vg_frame *out)
 {
     vg_err e;
     size_t n = t->to.skeleton.njoints;
-    const double *positions, *turns = driving_turns(t->driving.fitter, in);
+    const double *positions, *turns = driving_take(&t->driving, in);
     vg_driver_joints(t->driving.driver, in->values, turns, &positions, &turns);
     memcpy(out->values, positions, 3 * n * sizeof *positions);
     if (t->stay) put_back(n, t->to.at, out->values);

@@ -107,7 +107,7 @@ static void take_transforms(playback *p, size_t n, const vg_frame *in, double *c
     const double *poses[BATCH] = {NULL};
     for (size_t i = 0; i < n; i++) poses[i] = in[i].values;
     for (size_t i = 0; i < n && p->driving.driver; i++)
-        vg_driver_pose(p->driving.driver, poses[i], driving_turns(p->driving.fitter, &in[i]), to[i]);
+        vg_driver_pose(p->driving.driver, poses[i], driving_take(&p->driving, &in[i]), to[i]);
     if (p->driving.driver) return;
     if (p->kind == VG_VERTICES) vg_player_measure(p->player, n, poses, to);
     for (size_t i = 0; i < n && p->kind == VG_TRANSFORMS; i++) memcpy(to[i], poses[i], 7 * p->count * sizeof *to[i]);

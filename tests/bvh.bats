@@ -387,3 +387,44 @@ END
     must vg-deform --align none --onto cmu.bvh asf.bvh -o no.vgs
     [ "$(vg-deform --align none --onto cmu.bvh unreal.bvh -o no.vgs 2>&1 | grep -c upright)" = 0 ]
 }
+
+@test "conventions: a rest pose with any axis up and ahead, a motion with any axis up, turned by the root or not" {
+    captured cmu.bvh
+    styled() { # rest pose, motion
+        py "$@" <<END
+import sys
+sys.path.insert(0, "$ROOT/tests")
+import conventions
+conventions.convert("cmu.bvh", "mixamo", "v.bvh", 1, *sys.argv[1:])
+END
+        must vg-encode v.bvh -o v.vgs
+    }
+    styled yz yz
+    must_warn vg-deform --onto cmu.bvh v.bvh -o vectors.vgs # the limbs rest apart
+    [[ $stderr != *moves* && $stderr != *'rests with'* ]]
+    must vg-solve vectors.vgs -o truth.vgs
+    for rest in yz yx y-x y-z z-y zx zy xz; do
+        for motion in yz z-y; do
+            styled $rest $motion
+            must_warn vg-deform --onto cmu.bvh v.bvh -o vectors.vgs
+            case $rest:$motion in
+                yz:yz) [[ $stderr != *upright* && $stderr != *facing* ]] ;;
+                y*:z-y) says 'moves with z up' 'its motion is turned upright' ;;
+                [zx]*:yz) says "rests with ${rest:0:1} up" 'but moves with the same axis up: only its rest pose is turned' ;;
+                [zx]*:z-y) says "rests with ${rest:0:1} up" 'its motion is turned upright' ;;
+                *) says 'rests facing another way' ;;
+            esac
+            must vg-solve vectors.vgs -o out.vgs
+            must vg-diff -t 1e-5 truth.vgs out.vgs
+        done
+    done
+    # who lies at first is not stood up: along an axis, the hips near the ground and not as high as those of who stands
+    styled yz z-y
+    awk '/^Frame Time/ {print; on = 1; next} on {$2 = 2; $3 = 1} {print}' v.bvh >lies.bvh
+    must_warn vg-deform --onto cmu.bvh lies.bvh -o vectors.vgs
+    [[ $stderr != *upright* ]]
+    styled z-y yz # lies in a file whose z is up
+    awk '/^Frame Time/ {print; on = 1; next} on {$2 = 1; $3 = 2} {print}' v.bvh >lies.bvh
+    must_warn vg-deform --onto cmu.bvh lies.bvh -o vectors.vgs
+    says 'rests with z up' 'its motion is turned upright'
+}

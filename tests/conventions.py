@@ -1,6 +1,7 @@
-"""conventions.py IN.bvh STYLE OUT.bvh [EVERY]: the motion of IN.bvh, of joints as CMU or the kit name them, by the joints of another
-convention: names, order, rest pose, units, up axis, additional joints and joints left out. Where a joint is in a pose does not
-change but for units and axes: that is what the tests compare.
+"""conventions.py IN.bvh STYLE OUT.bvh [EVERY [REST MOTION]]: the motion of IN.bvh, of joints as CMU or the kit name them, by the
+joints of another convention: names, order, rest pose, units, up axis, additional joints and joints left out. Where a joint is in a
+pose does not change but for units and axes: that is what the tests compare. REST and MOTION name the axes of the rest pose and of the
+motion; where they differ, the root turns one into the other.
 SPDX-License-Identifier: GPL-3.0-or-later"""
 import math
 import re
@@ -231,7 +232,12 @@ def rest_turns(source, arms):
     return b
 
 
-def convert(path, style, out, every):
+# up and ahead: the rotation of a body that has y up and looks along z
+AXES = {"yz": IDENTITY, "yx": about("Y", 90), "y-x": about("Y", -90), "y-z": about("Y", 180), "z-y": about("X", 90),
+        "zx": product(about("Z", 90), about("X", 90)), "zy": product(about("Z", 180), about("X", 90)), "xz": about("Z", -90)}
+
+
+def convert(path, style, out, every, rest=None, motion=None):
     table, arms, scale, zup = STYLES[style]
     source, rows, step = read(path)
     named = {j.name: j for j in source if j.name}
@@ -239,7 +245,7 @@ def convert(path, style, out, every):
     tip = {j.parent: j for j in source if not j.name}
     world = {j: None for j in source}
     for j in source: world[j] = [x + y for x, y in zip(world[j.parent], apply(b[j.parent], j.offset))] if j.parent else [0.0, 0, 0]
-    up = about("X", 90) if zup else IDENTITY
+    up = AXES[rest or ("z-y" if zup else "yz")]
     joints, of = [], {}
     for name, parent, src in table():
         j = Joint(name, of.get(parent), None, None)
@@ -254,7 +260,7 @@ def convert(path, style, out, every):
         j.offset = apply(up, [scale * (x - y) for x, y in zip(j.at, up_at)])
         joints.append(j)
         of[name] = j
-    write(out, joints, source, b, rows[::every], step * every, scale, up)
+    write(out, joints, source, b, rows[::every], step * every, scale, up, AXES[motion] if motion else up)
 
 
 def finger_offset(named, hand, src):
@@ -268,7 +274,7 @@ def finger_offset(named, hand, src):
 LIMBS_BACK = {c: n for n, c in LIMBS.items()}
 
 
-def write(path, joints, source, b, rows, step, scale, up):
+def write(path, joints, source, b, rows, step, scale, up, world):
     children = {j: [c for c in joints if c.parent is j] for j in joints}
     order, out = [], ["HIERARCHY"]
 
@@ -294,9 +300,9 @@ def write(path, joints, source, b, rows, step, scale, up):
         for j in order:
             turn = product(turns[j.source], transpose(b[j.source])) if j.source else IDENTITY
             if j.source is None and j.parent is None: turn = turns[hips]
-            j.turn = product(product(up, turn), back)
+            j.turn = product(product(world, turn), back)
             if not j.parent:
-                line += ["%.6f" % x for x in apply(up, [scale * x for x in places[hips]])]
+                line += ["%.6f" % x for x in apply(world, [scale * x for x in places[hips]])]
                 local = j.turn
             else: local = product(transpose(j.parent.turn), j.turn)
             line += ["%.6f" % x for x in angles(local)]
@@ -305,4 +311,4 @@ def write(path, joints, source, b, rows, step, scale, up):
 
 
 if __name__ == "__main__":
-    convert(sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4]) if len(sys.argv) > 4 else 1)
+    convert(sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4]) if len(sys.argv) > 4 else 1, *sys.argv[5:])

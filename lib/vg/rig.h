@@ -20,7 +20,7 @@ int vg_skeleton_pair(const vg_skeleton *of, const vg_skeleton *by, uint32_t *par
  * all bones that both have. */
 typedef struct vg_driver vg_driver;
 typedef enum vg_align {
-    VG_ALIGN_AUTO = 0, /* if a limb differs by more than 20 degrees at rest: all limbs that differ by more than 10 */
+    VG_ALIGN_AUTO = 0, /* if a limb differs by more than 20 degrees at rest: all limbs that differ by more than 3 */
     VG_ALIGN_NONE,     /* no alignment: both rest poses and their axes as they are */
     VG_ALIGN_ALL,      /* all joints that have children */
     VG_ALIGN_CHOSEN    /* those of `chosen` */
@@ -39,10 +39,17 @@ size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow th
 /* vg_driver_aligned: the angle in degrees by which a joint of the rig was aligned with the other skeleton; 0: it
  * was not. */
 double vg_driver_aligned(const vg_driver *d, size_t joint);
-/* vg_driver_stands: the axis that is up for the other skeleton at rest, if it is not that of the rig: 1, 2, 3 for x, y, z, or the
- * negative; its motion is turned upright. 0: the same axis, or it is not known. faces: whether it faces along another axis at
- * rest, which is made up for. */
-int vg_driver_stands(const vg_driver *d, bool *faces);
+/* vg_driver_look: finds from the first pose of a motion (positions of the other skeleton's joints) which axis is up in it: that
+ * of the rest pose, unless the root turns it. To be called before the first pose is evaluated. */
+void vg_driver_look(vg_driver *d, const double *positions);
+/* vg_driver_stands: the axes that are up for the other skeleton, where they are not those of the rig, as 1, 2, 3 for x, y, z, or
+ * the negative; 0: the same axis, or it is not known. */
+typedef struct vg_stance {
+    int rests;  /* at rest, which is made up for */
+    int moves;  /* in its motion, which is turned upright */
+    bool faces; /* whether it faces along another axis at rest, which is made up for */
+} vg_stance;
+void vg_driver_stands(const vg_driver *d, vg_stance *stance);
 /* vg_driver_pose: positions and turns of the other skeleton's joints to nbones transforms. */
 void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms);
 /* vg_driver_joints: to positions and turns of the rig's own joints; both are borrowed until the next call. */

@@ -48,7 +48,7 @@ static int compare_rests(vg_driver *d, const vg_driver_options *o, vg_err *e)
     if (r == VG_OK) {
         d->scale = compare_sizes(d, &x);
         d->stance = (vgi_stance){.world = {1, 0, 0, 0}, .rest = {1, 0, 0, 0}};
-        if (o->align != VG_ALIGN_NONE) vgi_rests_stand(&x, &d->stance);
+        if (o->align != VG_ALIGN_NONE) vgi_rests_stand(&x, d->r->at, &d->stance);
         r = vgi_align(&x, o->align, o->chosen, d->before, d->degrees, e);
     }
     vgi_rests_clear(&x);
@@ -118,10 +118,15 @@ double vg_driver_aligned(const vg_driver *d, size_t joint)
     return d->degrees[joint];
 }
 
-int vg_driver_stands(const vg_driver *d, bool *faces)
+void vg_driver_look(vg_driver *d, const double *positions)
 {
-    *faces = d->stance.faces;
-    return d->stance.up;
+    vgi_stance_look(&d->stance, positions);
+}
+
+void vg_driver_stands(const vg_driver *d, vg_stance *to)
+{
+    const vgi_stance *s = &d->stance;
+    *to = (vg_stance){s->stands ? s->theirs : 0, s->moves != s->ours ? s->moves : 0, s->faces};
 }
 
 /* Offset of the other's joint k from the end of its bone, as position channels cause it. */

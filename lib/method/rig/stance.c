@@ -1,5 +1,6 @@
-/* stance.c: along which axes a skeleton stands and faces at rest. Programs differ: y or z is up, z, -y or x is ahead. What
- * differs less than axes do is left to align.c.
+/* stance.c: along which axes a skeleton stands and faces. Programs differ: y or z is up, z, -y or x is ahead; and the root of
+ * some files turns a rest pose with one axis up into a motion with another axis up. What differs less than axes do is left to
+ * align.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
 #include "numeric/vec3.h"
@@ -7,7 +8,10 @@
 #include <math.h>
 
 static const uint32_t NONE = UINT32_MAX;
-static const double FIRM = 0.8; /* least cosine of a direction with its axis */
+static const double FIRM = 0.8;  /* least cosine of a direction with its axis, at rest */
+static const double LOOSE = 0.6; /* and in motion */
+static const double STANDS[2] = {0.6, 1.4}; /* the hips of who stands are this high above the ground, in legs */
+static const double LIES[2] = {0.02, 0.4};  /* and of who lies */
 
 /* From the right joint of a part to the left one. */
 static bool find_left(const vg_skeleton *s, const vgi_role *roles, const double *at, vgi_part part, double left[3])
@@ -32,12 +36,12 @@ static bool find_up(const vg_skeleton *s, const vgi_role *roles, const double *a
 }
 
 /* The axis nearest to a direction, as 1, 2, 3 or the negative; 0 if none is near. */
-static int nearest_axis(const double d[3])
+static int nearest_axis(const double d[3], double firm)
 {
     int best = 0;
     for (int k = 1; k < 3; k++)
         if (fabs(d[k]) > fabs(d[best])) best = k;
-    if (!(fabs(d[best]) > FIRM * vgi_length(d))) return 0;
+    if (!(fabs(d[best]) > firm * vgi_length(d))) return 0;
     return d[best] > 0 ? best + 1 : -best - 1;
 }
 
@@ -53,7 +57,7 @@ static bool find_axes(const vg_skeleton *s, const vgi_role *roles, const double 
     double up[3], left[3];
     if (!find_up(s, roles, at, up)) return false;
     if (!find_left(s, roles, at, VGI_THIGH, left) && !find_left(s, roles, at, VGI_UPPER_ARM, left)) return false;
-    axes[0] = nearest_axis(up), axes[1] = nearest_axis(left);
+    axes[0] = nearest_axis(up, FIRM), axes[1] = nearest_axis(left, FIRM);
     return axes[0] && axes[1] && axes[0] != axes[1] && axes[0] != -axes[1];
 }
 
@@ -67,18 +71,88 @@ static void turn_axes(const int theirs[2], const int ours[2], double q[4])
     vg_quat_from_matrix(m, q);
 }
 
-void vgi_rests_stand(vgi_rests *x, vgi_stance *stance)
+static void turn_up(int from, int to, double q[4])
+{
+    double a[3], b[3];
+    axis_vector(from, a), axis_vector(to, b);
+    vg_quat_between(a, b, q);
+}
+
+/* The joints by which vgi_stance_look tells how the body stands. */
+static void find_body(const vgi_rests *x, vgi_stance *s)
+{
+    s->top = vgi_find_role(x->by, x->their_roles, VGI_HEAD, 0);
+    if (s->top == NONE) s->top = vgi_find_role(x->by, x->their_roles, VGI_NECK, 0);
+    for (int side = 0; side < 2; side++)
+        s->below[side] = vgi_find_role(x->by, x->their_roles, VGI_FOOT, 2 * side - 1);
+    s->hips[0] = vgi_find_role(x->by, x->their_roles, VGI_THIGH, -1);
+    s->hips[1] = vgi_find_role(x->by, x->their_roles, VGI_THIGH, 1);
+    s->leg = vgi_leg_length(x->by, x->their_roles, x->theirs);
+}
+
+/* The skeleton of the rig itself: whatever its motion does, the rig was fitted to it. */
+static bool is_own(const vgi_rests *x)
+{
+    size_t n = x->of->njoints;
+    if (x->by->njoints != n) return false;
+    double most = 1e-6 * vg_diagonal(x->rest, n);
+    for (size_t j = 0; j < n; j++) {
+        const vg_joint *a = &x->of->joints[j], *b = &x->by->joints[j];
+        if (strcmp(a->name, b->name) || a->parent != b->parent) return false;
+        if (a->parent != NONE && vgi_square(a->offset, b->offset) > most * most) return false;
+    }
+    return true;
+}
+
+void vgi_rests_stand(vgi_rests *x, const double *at, vgi_stance *stance)
 {
     int ours[2], theirs[2];
+    double up[3], upright[4];
     *stance = (vgi_stance){.world = {1, 0, 0, 0}, .rest = {1, 0, 0, 0}};
+    if (is_own(x)) return;
     if (!find_axes(x->of, x->roles, x->rest, ours) || !find_axes(x->by, x->their_roles, x->theirs, theirs)) return;
-    if (ours[0] == theirs[0] && ours[1] == theirs[1]) return;
-    double a[3], b[3];
-    axis_vector(theirs[0], a), axis_vector(ours[0], b);
-    vg_quat_between(a, b, stance->world);
+    find_body(x, stance);
+    stance->ours = find_up(x->of, x->roles, at, up) ? nearest_axis(up, FIRM) : 0;
+    if (!stance->ours) stance->ours = ours[0];
+    stance->theirs = stance->moves = theirs[0];
+    turn_up(theirs[0], stance->ours, stance->world);
     turn_axes(theirs, ours, stance->rest);
-    stance->up = ours[0] != theirs[0] ? theirs[0] : 0;
-    double same = fabs(vgi_dot(stance->world, stance->rest) + stance->world[3] * stance->rest[3]);
-    stance->faces = same < 0.99;
+    turn_up(theirs[0], ours[0], upright);
+    stance->stands = ours[0] != theirs[0];
+    stance->faces = fabs(vgi_dot(upright, stance->rest) + upright[3] * stance->rest[3]) < 0.99;
     for (size_t j = 0; j < x->by->njoints; j++) vg_quat_apply(stance->rest, x->theirs + 3 * j, x->theirs + 3 * j);
+}
+
+/* ---- in motion ---- */
+
+/* The height of the hips along an axis, in legs, above a ground at 0. */
+static double hips_along(const vgi_stance *s, const double *positions, int axis)
+{
+    double hips[3], up[3];
+    axis_vector(axis, up);
+    vgi_mix(positions + 3 * s->hips[0], positions + 3 * s->hips[1], 0.5, hips);
+    return vgi_dot(hips, up) / s->leg;
+}
+
+static bool is_within(double x, const double range[2])
+{
+    return x > range[0] && x < range[1];
+}
+
+/* A body that is stretched along another axis than at rest either lies or has been turned by its root. It has been turned if its
+ * hips are as high along this axis as those of who stands; if it is the axis that the rig has up, also if they are not as low
+ * along the other one as those of who lies. */
+void vgi_stance_look(vgi_stance *s, const double *positions)
+{
+    double feet[3], up[3];
+    if (!s->theirs || !(s->leg > 0) || s->top == NONE || s->below[0] == NONE || s->below[1] == NONE) return;
+    vgi_mix(positions + 3 * s->below[0], positions + 3 * s->below[1], 0.5, feet);
+    vgi_subtract(positions + 3 * s->top, feet, up);
+    int axis = nearest_axis(up, LOOSE);
+    if (!axis || axis == s->theirs) return;
+    bool stands = is_within(hips_along(s, positions, axis), STANDS);
+    bool lies = is_within(hips_along(s, positions, s->theirs), LIES);
+    if (!stands && (axis != s->ours || lies)) return;
+    s->moves = axis;
+    turn_up(axis, s->ours, s->world);
 }
