@@ -42,6 +42,26 @@ horse() { echo "$BATS_FILE_TMPDIR/horse.$1"; }
     [ ! -e no.net ]
 }
 
+@test "states of a large mesh that are computed again: the same bytes with any number of threads, and resumed" {
+    large="--no-provenance -q --hold-at end --layers 1 --hidden 4 --batch 5 --frames 32 --iterations 3 --model conv"
+    wide=75 # states of eight chains of 32 frames take more than 64 MiB
+    [ $((wide * wide * 12 * 32 * 32)) -gt $((64 << 20)) ]
+    for t in {100..150}; do
+        awk -v n=$wide -v t=$t 'BEGIN {
+            for (i = 0; i < n; i++) for (k = 0; k < n; k++)
+                printf "v %.5f %.5f %.5f\n", i / n, k / n, 0.2 * sin(5 * i / n + t / 3) * cos(4 * k / n - t / 7)
+            for (i = 1; i < n; i++) for (k = 1; k < n; k++) {
+                at = n * (i - 1) + k
+                printf "f %d %d %d %d\n", at, at + n, at + n + 1, at + 1
+            }
+        }' >pose.$t.obj
+    done
+    must vg-encode -q pose.*.obj -o large.vgs
+    must vg-train $large -j 1 --checkpoint half.net --every 2 large.vgs -o one.net
+    must vg-train $large -j 2 --resume half.net large.vgs -o resumed.net
+    must cmp one.net resumed.net
+}
+
 @test "keys go out as they came in, with poses between: by the better way, by the best found, by ways that meet" {
     must vg-encode --reference "$DATA/horse.rest.obj" --take 1,9,15 "$DATA/horse-run.tar.xz" -o keys.vgs
     for options in "" "--optimise" "--merge 5%" "--seed 7" "--root stay"; do

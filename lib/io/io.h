@@ -5,6 +5,7 @@
 #define VG_IO_H
 
 #include "core/core.h"
+#include "core/nameless.h"
 
 /* input.c: bytes from a descriptor or from memory, with lookahead */
 
@@ -46,14 +47,8 @@ int vgi_reader_open_input(vg_reader **r, vgi_input *in, vg_err *e) VG_MUST_CHECK
 /* Whether data starts like a stream. */
 bool vgi_is_stream(const unsigned char *data, size_t n);
 
-/* vgi_nameless_file: create an unnamed file in $TMPDIR (or /tmp), for reading and writing; returns its descriptor. */
-int vgi_nameless_file(vg_err *e) VG_MUST_CHECK;
-/* vgi_read_back: read n bytes of such a file from `off` on; VG_ESYS if they cannot be read. */
-int vgi_read_back(int fd, uint64_t off, void *to, size_t n, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_spool: copy the rest of an input that can be read only once into an unnamed file. */
 int vgi_input_spool(vgi_input *in, int *fd, vg_err *e) VG_MUST_CHECK;
-/* vgi_write_all: write n bytes to fd, continuing after interruptions; VG_ESYS naming `name`. */
-int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
 
 /* number.c: numbers as text, independent of the locale */
 

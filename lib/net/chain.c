@@ -2,7 +2,9 @@
  * recurrent layers, and back out as the change to the next frame; and backpropagation through time.
  *
  * Activations of convolutions are not stored, because they are as large as the mesh; they are recomputed in the
- * backward pass. Elementwise operations are in layer_kernel.c.
+ * backward pass. Of a large mesh, states are recomputed too, from every sixth or so, and the gradient of the variance,
+ * as large as that of the full layer, is made in a pass of its own, so that both need not be held at once.
+ * Elementwise operations are in layer_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/chain.h"
 
@@ -11,6 +13,8 @@
 
 /* Gradients of a full layer are summed over as many steps in one product as need this many bytes, and PACK at least. */
 enum { PACK = 4, PACK_BYTES = 40 << 20, ROWS_AT_ONCE = 192 };
+/* Chains whose states take more than this many bytes keep only some of them. */
+enum { STATE_BYTES = 64 << 20 };
 
 #define FLAT(rows) ((real *)(rows))
 #define FLAT_IN(rows) ((const real *)(rows))
@@ -22,18 +26,24 @@ static size_t most(size_t a, size_t b)
     return a > b ? a : b;
 }
 
-static size_t frames_of(const vgi_shape *s)
+/* Kept states and those between two of them are fewest if they are as many. */
+static size_t choose_apart(const vgi_shape *s, size_t steps)
 {
-    return s->front == VGI_FRONT_MESH ? 2 * s->convolutions + 12 : 6;
+    size_t bytes, apart = 1;
+    if (s->front != VGI_FRONT_MESH || !vgi_mul(steps * s->numbers, sizeof(net_lanes), &bytes)) return 1;
+    while (bytes > STATE_BYTES && apart * apart < steps) apart++;
+    return apart;
 }
 
 /* Lay out all arrays in one block; with base NULL only compute its size. */
 static size_t lay_out(net_chains *c, net_lanes *base)
 {
     const vgi_shape *s = c->shape;
-    size_t n = 0, t = c->steps;
+    size_t n = 0, t = c->steps, mesh = s->front == VGI_FRONT_MESH ? s->numbers : 0, linear = s->numbers - mesh;
 #define PLACE(array, rows) (c->array = base ? base + n : NULL, n += (rows))
-    PLACE(state, t * s->numbers);
+    PLACE(state, ((t - 1) / c->apart + 1) * s->numbers);
+    PLACE(near, (c->apart - 1) * s->numbers);
+    PLACE(ahead, c->apart > 1 ? s->numbers : 0);
     PLACE(latent, t * s->latent);
     PLACE(spread, s->uncertain ? t * s->latent : 0);
     PLACE(noise, s->uncertain ? t * s->latent : 0);
@@ -43,15 +53,25 @@ static size_t lay_out(net_chains *c, net_lanes *base)
         PLACE(cell[l], (t + 1) * s->hidden);
     }
     PLACE(top, t * s->hidden);
-    for (size_t i = 0; i < frames_of(s); i++) PLACE(frame[i], s->numbers);
+    for (size_t i = 0; i <= s->convolutions; i++) PLACE(inner[i], s->numbers);
+    PLACE(work, 2 * mesh);
+    PLACE(dy, s->numbers);
+    PLACE(other, mesh);
+    PLACE(dstate, s->numbers);
+    PLACE(dinput, s->numbers);
+    PLACE(room[0], s->numbers);
+    PLACE(room[1], linear); /* only a skeleton looks at two frames */
+    PLACE(from_behind, linear);
+    PLACE(later, linear);
     PLACE(row, (size_t)16 * most(s->latent, 4 * s->hidden));
 #undef PLACE
     return n;
 }
 
-int net_chains_make(net_chains *c, const vgi_shape *s, size_t steps, vg_err *e)
+int net_chains_make(net_chains *c, const vgi_shape *s, size_t steps, size_t apart, vg_err *e)
 {
-    *c = (net_chains){.shape = s, .steps = steps};
+    *c = (net_chains){.shape = s, .steps = steps, .apart = apart ? apart : choose_apart(s, steps)};
+    c->late = c->apart > 1 && s->uncertain;
     size_t fit = PACK_BYTES / (2 * s->numbers * sizeof *c->state), most_steps = fit < PACK ? PACK : fit;
     c->packed = steps - 1 < most_steps ? steps - 1 : most_steps;
     size_t widest = s->front == VGI_FRONT_MESH ? c->packed * (2 * s->numbers + 6 * s->latent + 2 * ROWS_AT_ONCE) : 0;
@@ -100,31 +120,31 @@ static net_convolution layer(const net_drive *d, size_t k, bool mirrored)
                              p + (mirrored ? s->bias_back[k] : s->bias[k]), mirrored};
 }
 
-/* frame[0 .. convolutions - 1]: outputs of the convolutions of x; returns the last */
+/* inner[0 .. convolutions - 1]: outputs of the convolutions of x; returns the last */
 static const net_lanes *convolve_in(net_chains *c, const net_drive *d, const net_lanes *x)
 {
     const vgi_shape *s = c->shape;
     net_neighbours g = neighbours(s);
     for (size_t k = 0; k < s->convolutions; k++) {
         net_convolution one = layer(d, k, false);
-        net_convolve(&g, &one, x, c->frame[k], c->frame[2 * s->convolutions + 1]);
-        x = c->frame[k];
+        net_convolve(&g, &one, x, c->inner[k], c->work);
+        x = c->inner[k];
     }
     return x;
 }
 
-/* frame[convolutions .. 2 * convolutions]: from h of the last layer to the change; returns the last */
+/* inner[0 .. convolutions]: from h of the last layer to the change; returns the last */
 static net_lanes *convolve_out(net_chains *c, const net_drive *d, const net_lanes *top)
 {
     const vgi_shape *s = c->shape;
     net_neighbours g = neighbours(s);
-    net_lanes *x = c->frame[s->convolutions];
+    net_lanes *x = c->inner[0];
     net_multiply(s->numbers, s->latent, d->parameters + s->full, top, false, x);
     if (!s->convolutions) net_tanh(x, s->numbers);
     for (size_t i = 0; i < s->convolutions; i++) {
         net_convolution one = layer(d, s->convolutions - 1 - i, true);
-        net_convolve(&g, &one, x, c->frame[s->convolutions + 1 + i], c->frame[2 * s->convolutions + 1]);
-        x = c->frame[s->convolutions + 1 + i];
+        net_convolve(&g, &one, x, c->inner[i + 1], c->work);
+        x = c->inner[i + 1];
     }
     return x;
 }
@@ -183,7 +203,7 @@ static void decode_frame(net_chains *c, const net_drive *d, size_t t, net_lanes 
         for (size_t k = 0; k < s->numbers; k++) next[k] += y[k];
         return;
     }
-    net_lanes *y = c->frame[0];
+    net_lanes *y = c->inner[0];
     net_multiply_turned(s->hidden, s->numbers, d->parameters + s->full, top, false, y);
     for (size_t k = 0; k < s->numbers; k++)
         next[k] += (y[k] + d->parameters[s->full_bias + k]) * d->scale_out[k];
@@ -225,24 +245,60 @@ void net_chains_step(net_chains *c, const net_drive *d, size_t t, const net_lane
     if (d->skeleton) add_skeleton(d, x, before, next);
 }
 
-/* input of step t: given, or the chains' own output; given frames are copied to `room` */
-static const net_lanes *input(const net_chains *c, const net_drive *d, size_t t, net_lanes *room)
+/* place of frame t of the chains */
+static net_lanes *place_of(net_chains *c, size_t t)
 {
-    if (t >= d->given) return c->state + t * c->shape->numbers;
+    size_t n = c->shape->numbers, beside = t % c->apart;
+    return beside ? c->near + (beside - 1) * n : c->state + t / c->apart * n;
+}
+
+/* input of step t: given, then copied to `room`, or the chains' own output x */
+static const net_lanes *input(const net_drive *d, size_t t, const net_lanes *x, net_lanes *room)
+{
+    if (t >= d->given) return x;
     d->truth(d->context, t, room);
     return room;
 }
 
 void net_chains_forward(net_chains *c, const net_drive *d)
 {
-    size_t n = c->shape->numbers, rooms = frames_of(c->shape);
     const net_lanes *before = NULL;
     d->truth(d->context, 0, c->state);
     for (size_t t = 0; t + 1 < c->steps; t++) {
-        const net_lanes *x = input(c, d, t, c->frame[rooms - 1 - t % 2]);
-        net_chains_step(c, d, t, x, before, c->state + (t + 1) * n);
+        const net_lanes *x = input(d, t, place_of(c, t), c->room[c->shape->front == VGI_FRONT_LINEAR && t % 2]);
+        net_chains_step(c, d, t, x, before, place_of(c, t + 1));
         before = x;
     }
+    c->segment = (c->steps - 1) / c->apart;
+    c->ahead_at = 0;
+}
+
+/* Frame t + 1 from frame t once more, with what the recurrent layers gave. */
+static void repeat_step(net_chains *c, const net_drive *d, size_t t, const net_lanes *from, net_lanes *to)
+{
+    const net_lanes *x = input(d, t, from, c->room[0]);
+    if (x != to) memcpy(to, x, c->shape->numbers * sizeof *to);
+    decode_frame(c, d, t, to);
+}
+
+const net_lanes *net_chains_state(net_chains *c, const net_drive *d, size_t t)
+{
+    size_t first = t - t % c->apart;
+    if (t > first && c->segment != t / c->apart) {
+        for (size_t i = first; i + 1 < first + c->apart && i + 1 < c->steps; i++)
+            repeat_step(c, d, i, place_of(c, i), place_of(c, i + 1));
+        c->segment = t / c->apart;
+    }
+    return place_of(c, t);
+}
+
+const net_lanes *net_chains_state_ahead(net_chains *c, const net_drive *d, size_t t)
+{
+    size_t first = t - t % c->apart, from = c->ahead_at > first && c->ahead_at <= t ? c->ahead_at : first;
+    if (t == first) return place_of(c, t);
+    for (size_t i = from; i < t; i++) repeat_step(c, d, i, i > first ? c->ahead : place_of(c, i), c->ahead);
+    c->ahead_at = t;
+    return c->ahead;
 }
 
 /* ---- backward ---- */
@@ -289,22 +345,35 @@ static void put_waiting(net_lanes *to, size_t step, const net_lanes *rows, size_
     memcpy(to + step * n, rows, n * sizeof *rows);
 }
 
-/* Add the gradients of the steps collected: of the layer as the encoder and as the decoder, and of the variance. */
-static void multiply_packed(const vgi_shape *s, waiting *w, real *gradient)
+/* Add the gradients of the steps collected: of the layer as the encoder and as the decoder, and of the variance
+ * (NULL: not now). */
+static void multiply_packed(const vgi_shape *s, waiting *w, real *gradient, real *variance)
 {
     size_t n = s->numbers, latent = s->latent, k = w->steps * NET_LANES;
     pack_rows(w->latent, latent, latent, w->steps, w->right, 2 * k);
     pack_rows(w->top, latent, latent, w->steps, w->right + k, 2 * k);
-    if (s->uncertain) pack_rows(w->spread, latent, latent, w->steps, w->right_spread, k);
+    if (variance) pack_rows(w->spread, latent, latent, w->steps, w->right_spread, k);
     for (size_t first = 0; k && first < n; first += ROWS_AT_ONCE) {
         size_t rows = n - first < ROWS_AT_ONCE ? n - first : ROWS_AT_ONCE;
         pack_rows(w->in + first, n, rows, w->steps, w->left, 2 * k);
         pack_rows(w->out + first, n, rows, w->steps, w->left + k, 2 * k);
         NET_GEMM(false, true, rows, latent, 2 * k, w->left, 2 * k, w->right, 2 * k, 1,
                  gradient + s->full + first * latent, latent);
-        if (s->uncertain)
-            NET_GEMM(false, true, rows, latent, k, w->left, 2 * k, w->right_spread, k, 1,
-                     gradient + s->variance + first * latent, latent);
+        if (variance)
+            NET_GEMM(false, true, rows, latent, k, w->left, 2 * k, w->right_spread, k, 1, variance + first * latent, latent);
+    }
+    w->steps = 0;
+}
+
+/* Of the variance alone. */
+static void multiply_variance(const vgi_shape *s, waiting *w, real *variance)
+{
+    size_t n = s->numbers, latent = s->latent, k = w->steps * NET_LANES;
+    pack_rows(w->spread, latent, latent, w->steps, w->right_spread, k);
+    for (size_t first = 0; first < n; first += ROWS_AT_ONCE) {
+        size_t rows = n - first < ROWS_AT_ONCE ? n - first : ROWS_AT_ONCE;
+        pack_rows(w->in + first, n, rows, w->steps, w->left, k);
+        NET_GEMM(false, true, rows, latent, k, w->left, k, w->right_spread, k, 1, variance + first * latent, latent);
     }
     w->steps = 0;
 }
@@ -322,14 +391,27 @@ typedef struct backward {
     waiting w;
 } backward;
 
+/* where the gradient of the parameters at an offset goes */
+static real *gradient_at(const backward *b, size_t offset)
+{
+    const vgi_shape *s = b->c->shape;
+    return b->gradient + (b->c->late && offset > s->variance ? offset - s->numbers * s->latent : offset);
+}
+
+static void multiply_waiting(backward *b)
+{
+    const net_chains *c = b->c;
+    const vgi_shape *s = c->shape;
+    multiply_packed(s, &b->w, b->gradient, s->uncertain && !c->late ? b->gradient + s->variance : NULL);
+}
+
 /* dh of the last layer from the gradient of the change; x: input of step t */
 static void decode_back(backward *b, size_t t, const net_lanes *x, net_lanes *dtop)
 {
     net_chains *c = b->c;
     const vgi_shape *s = c->shape;
-    net_lanes *dy = c->frame[2 * s->convolutions + 4], *other = c->frame[2 * s->convolutions + 5];
-    if (s->front == VGI_FRONT_LINEAR) {
-        dy = c->frame[2]; /* stored until all steps are packed: see below */
+    net_lanes *dy = c->dy, *other = c->other;
+    if (s->front == VGI_FRONT_LINEAR) { /* stored until all steps are packed: see below */
         for (size_t k = 0; k < s->numbers; k++) dy[k] = b->dstate[k] * b->d->scale_out[k];
         memcpy(c->latent + t * s->latent, dy, s->numbers * sizeof *dy); /* the same number of rows; the mean is no
                                                                            longer needed */
@@ -339,12 +421,12 @@ static void decode_back(backward *b, size_t t, const net_lanes *x, net_lanes *dt
     net_neighbours g = neighbours(s);
     if (s->convolutions) convolve_out(c, b->d, c->top + t * s->hidden);
     memcpy(dy, b->dstate, s->numbers * sizeof *dy);
-    if (!s->convolutions) net_tanh_back(s->numbers, c->state + (t + 1) * s->numbers, x, dy);
+    if (!s->convolutions) net_tanh_back(s->numbers, net_chains_state(c, b->d, t + 1), x, dy);
     for (size_t k = 0; k < s->convolutions; k++) {
-        size_t out = 2 * s->convolutions - k;
+        size_t out = s->convolutions - k;
         net_convolution one = layer(b->d, k, true);
-        net_convolve_back(&g, &one, c->frame[out - 1], c->frame[out], dy, other, b->gradient + s->own[k],
-                          b->gradient + s->mean[k], b->gradient + s->bias_back[k], c->frame[2 * s->convolutions + 2]);
+        net_convolve_back(&g, &one, c->inner[out - 1], c->inner[out], dy, other, b->gradient + s->own[k],
+                          b->gradient + s->mean[k], b->gradient + s->bias_back[k], c->work);
         net_lanes *swap = dy;
         dy = other, other = swap;
     }
@@ -399,22 +481,23 @@ static void encode_back(backward *b, size_t t, const net_lanes *x)
         return;
     }
     net_neighbours g = neighbours(s);
-    net_lanes *dx = b->dinput, *other = c->frame[2 * s->convolutions + 5];
+    net_lanes *dx = b->dinput, *other = c->other;
     if (s->uncertain) spread_back(b, t);
     const net_lanes *last = convolve_in(c, b->d, x);
     put_waiting(b->w.in, b->w.steps, last, s->numbers);
     put_waiting(b->w.latent, b->w.steps, b->dlatent, s->latent);
     if (s->uncertain) {
         put_waiting(b->w.spread, b->w.steps, b->dspread, s->latent);
-        add_sums(b->dspread, 0, s->latent, 1, b->gradient + s->variance_bias);
+        add_sums(b->dspread, 0, s->latent, 1, gradient_at(b, s->variance_bias));
+        memcpy(c->spread + t * s->latent, b->dspread, s->latent * sizeof *c->spread); /* for net_chains_variance */
     }
-    if (++b->w.steps == c->packed) multiply_packed(s, &b->w, b->gradient);
+    if (++b->w.steps == c->packed) multiply_waiting(b);
     net_multiply(s->numbers, s->latent, b->d->parameters + s->full, b->dlatent, false, dx);
     if (s->uncertain) net_multiply(s->numbers, s->latent, b->d->parameters + s->variance, b->dspread, true, dx);
     for (size_t k = s->convolutions; k-- > 0;) {
         net_convolution one = layer(b->d, k, false);
-        net_convolve_back(&g, &one, k ? c->frame[k - 1] : x, c->frame[k], dx, other, b->gradient + s->own[k],
-                          b->gradient + s->mean[k], b->gradient + s->bias[k], c->frame[2 * s->convolutions + 2]);
+        net_convolve_back(&g, &one, k ? c->inner[k - 1] : x, c->inner[k], dx, other, b->gradient + s->own[k],
+                          b->gradient + s->mean[k], b->gradient + s->bias[k], c->work);
         net_lanes *swap = dx;
         dx = other, other = swap;
     }
@@ -427,14 +510,14 @@ static void finish_gradients(backward *b)
     net_chains *c = b->c;
     const vgi_shape *s = c->shape;
     size_t steps = c->steps - 1, h = s->hidden, k = steps * NET_LANES;
-    if (s->front == VGI_FRONT_MESH) multiply_packed(s, &b->w, b->gradient); /* its workspace is where the next one is */
+    if (s->front == VGI_FRONT_MESH) multiply_waiting(b); /* its workspace is where the next one is */
     for (size_t l = 0; l < s->layers; l++) {
         size_t rows = input_rows(s, l);
         real *in = c->pack, *out = in + rows * k;
         pack_rows(c->input[l], rows, rows, steps, in, k);
         pack_rows(c->gates[l], 4 * h, 4 * h, steps, out, k);
-        NET_GEMM(false, true, rows, 4 * h, k, in, k, out, k, 1, b->gradient + s->gates[l], 4 * h);
-        add_sums(c->gates[l], 4 * h, 4 * h, steps, b->gradient + s->gates_bias[l]);
+        NET_GEMM(false, true, rows, 4 * h, k, in, k, out, k, 1, gradient_at(b, s->gates[l]), 4 * h);
+        add_sums(c->gates[l], 4 * h, 4 * h, steps, gradient_at(b, s->gates_bias[l]));
     }
     if (s->front == VGI_FRONT_MESH) return;
     real *top = c->pack, *out = top + h * k;
@@ -448,14 +531,14 @@ static void prepare_backward(backward *b)
 {
     net_chains *c = b->c;
     const vgi_shape *s = c->shape;
-    size_t wide = most(s->latent, 4 * s->hidden), last = frames_of(s);
+    size_t wide = most(s->latent, 4 * s->hidden);
     b->dlatent = c->row + wide, b->dspread = c->row + 2 * wide;
     net_lanes *states = c->row + 3 * wide; /* layers * 2 * hidden <= 4 * wide */
     for (size_t l = 0; l < s->layers; l++) {
         b->dh[l] = states + 2 * l * s->hidden, b->dc[l] = b->dh[l] + s->hidden;
         memset(b->dh[l], 0, 2 * s->hidden * sizeof *states);
     }
-    b->dstate = c->frame[last - 3], b->dinput = c->frame[last - 4];
+    b->dstate = c->dstate, b->dinput = c->dinput;
     if (s->front != VGI_FRONT_MESH) return;
     b->w = begin_waiting(c);
 }
@@ -478,14 +561,14 @@ void net_chains_backward(net_chains *c, const net_drive *d, void (*pull)(void *c
     const vgi_shape *s = c->shape;
     backward b = {.c = c, .d = d, .gradient = gradient, .divergence = divergence, .shares = shares};
     prepare_backward(&b);
-    size_t n = s->numbers, last = frames_of(s);
-    net_lanes *from_behind = c->frame[last - 5], *later = c->frame[last - 6], *dtop = c->row;
+    size_t n = s->numbers;
+    net_lanes *from_behind = s->front == VGI_FRONT_MESH ? c->dinput : c->from_behind, *later = c->later, *dtop = c->row;
     memset(from_behind, 0, n * sizeof *from_behind);
     for (size_t t = c->steps - 1; t-- > 0;) {
-        if (t + 2 < c->steps) memcpy(later, b.dstate, n * sizeof *later);
+        if (d->skeleton && t + 2 < c->steps) memcpy(later, b.dstate, n * sizeof *later);
         memcpy(b.dstate, from_behind, n * sizeof *from_behind);
         pull(context, t + 1, b.dstate);
-        const net_lanes *x = input(c, d, t, c->frame[last - 1]);
+        const net_lanes *x = input(d, t, t < d->given ? NULL : net_chains_state(c, d, t), c->room[0]);
         decode_back(&b, t, x, dtop);
         recur_back(&b, t, dtop);
         encode_back(&b, t, x);
@@ -495,4 +578,17 @@ void net_chains_backward(net_chains *c, const net_drive *d, void (*pull)(void *c
     finish_gradients(&b);
     for (size_t l = 0; start && l < s->layers; l++)
         memcpy(start + 2 * l * s->hidden, b.dh[l], 2 * s->hidden * sizeof *start);
+}
+
+void net_chains_variance(net_chains *c, const net_drive *d, real *gradient)
+{
+    const vgi_shape *s = c->shape;
+    waiting w = begin_waiting(c);
+    c->ahead_at = 0;
+    for (size_t t = 0; t + 1 < c->steps; t++) {
+        const net_lanes *x = input(d, t, t < d->given ? NULL : net_chains_state_ahead(c, d, t), c->room[0]);
+        put_waiting(w.in, w.steps, convolve_in(c, d, x), s->numbers);
+        put_waiting(w.spread, w.steps, c->spread + t * s->latent, s->latent);
+        if (++w.steps == c->packed || t + 2 == c->steps) multiply_variance(s, &w, gradient);
+    }
 }

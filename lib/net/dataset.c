@@ -165,16 +165,29 @@ int vgi_spans_coordinates(const vgi_spans *spans, const vgi_dataset *s, vgi_fram
 
 /* ---- coordinates ---- */
 
-void vgi_dataset_normalised(const vgi_dataset *s, const vg_network *n, size_t i, double *x)
+/* number k of n's input from that of the features */
+static double normal_number(const vg_network *n, size_t k, double q)
 {
     static const double reach = 0.95;
+    size_t group = k % n->width >= 3;
+    double scale = 2 * reach / (n->high[group] - n->low[group]);
+    return (q - n->low[group]) * scale - reach;
+}
+
+void vgi_dataset_normalise(vgi_dataset *s, const vg_network *n)
+{
+    for (size_t i = 0; i < s->n; i++)
+        for (size_t k = 0; k < s->d; k++) {
+            float *q = s->features + i * s->d + k;
+            *q = (float)normal_number(n, k, (double)*q);
+        }
+    s->normal = true;
+}
+
+void vgi_dataset_normalised(const vgi_dataset *s, const vg_network *n, size_t i, double *x)
+{
     const float *q = s->features + i * s->d;
-    double scale[2];
-    for (int g = 0; g < 2; g++) scale[g] = 2 * reach / (n->high[g] - n->low[g]);
-    for (size_t k = 0; k < s->d; k++) {
-        size_t group = k % n->width >= 3;
-        x[k] = ((double)q[k] - n->low[group]) * scale[group] - reach;
-    }
+    for (size_t k = 0; k < s->d; k++) x[k] = s->normal ? (double)q[k] : normal_number(n, k, (double)q[k]);
 }
 
 static void find_range(const vgi_dataset *s, vg_network *n)

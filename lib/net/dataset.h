@@ -21,7 +21,8 @@ typedef struct vgi_dataset {
     size_t nv, parts, d, n;   /* d: numbers per frame, nv * width */
     size_t main_part;         /* index of the largest component */
     double diagonal;
-    float *features;          /* n x d: from vg_featurer, lengths in D */
+    float *features;          /* n x d: from vg_featurer, lengths in D; */
+    bool normal;              /* ... or as input of a network */
     float *home;              /* n x nv x 3: poses without root motion, the centroid of each part at 0 */
     double *roots, *centroids; /* n x 4, n x parts x 3 */
     size_t features_cap, home_cap, roots_cap, centroids_cap, sequences_cap;
@@ -50,6 +51,8 @@ int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at,
 /* vgi_dataset_find_coordinates: range and change of n's features, mean, basis, scales, and range of the coordinates,
  * from the frames in s->train. VG_EINPUT with fewer than 4. */
 int vgi_dataset_find_coordinates(vgi_dataset *s, vg_network *n, size_t most, int threads, vg_err *e) VG_MUST_CHECK;
+/* vgi_dataset_normalise: all features become input of n. */
+void vgi_dataset_normalise(vgi_dataset *s, const vg_network *n);
 /* vgi_dataset_normalised: frame i as input of n. */
 void vgi_dataset_normalised(const vgi_dataset *s, const vg_network *n, size_t i, double *x);
 

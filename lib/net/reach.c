@@ -90,7 +90,7 @@ static int prepare_reaching(reaching *j, size_t given, const double *in, size_t 
     j->drive = runner->drive;
     j->drive.given = take_given(j, given, in);
     j->drive.truth = give, j->drive.context = j;
-    return net_chains_make(&j->chains, &runner->shape, j->drive.given + n, e);
+    return net_chains_make(&j->chains, &runner->shape, j->drive.given + n, 1, e);
 }
 
 int vgi_runner_reach(vgi_runner *runner, size_t given, const double *in, size_t n, const double *target, size_t rounds,

@@ -54,7 +54,7 @@ int vgi_runner_make(vgi_runner *u, const vg_network *n, const uint32_t *first, c
     u->drive.shape = &u->shape;
     if (r == VG_OK) r = take_numbers(u, e);
     if (r == VG_OK && chains) u->chains = *chains, u->borrowed = true;
-    else if (r == VG_OK) r = net_chains_make(&u->chains, &u->shape, 2, e);
+    else if (r == VG_OK) r = net_chains_make(&u->chains, &u->shape, 2, 1, e);
     if (r == VG_OK && (!(u->start = net_array(2 * n->layers * n->hidden, e)) ||
                           !(u->now = net_array(3 * n->numbers, e))))
         r = VG_ENOMEM;

@@ -16,8 +16,8 @@
 #include <stdlib.h>
 
 static const double clip = 5, least_rate = 0.02, repeats = 1e-5;
-enum { VALIDATE_EVERY = 20, FOLDS = 5, SINGLE = 4, /* one in so many iterations starts from single frames */
-       CHUNK = 1 << 16, ERRORS = 2 * VG_NETWORK_METHODS * VG_NETWORK_FRAMES };
+enum { MOST_BEST = 64 << 20 }; /* bytes of the best parameters that are held in memory */
+enum { VALIDATE_EVERY = 20, FOLDS = 5, CHUNK = 1 << 16, ERRORS = 2 * VG_NETWORK_METHODS * VG_NETWORK_FRAMES };
 
 vg_train_options vg_train_defaults(vg_network_model m)
 {
@@ -103,13 +103,13 @@ void vg_trainer_free(vg_trainer **out)
     if (!t) return;
     clear_phase(t);
     vg_network_clear(&t->net);
+    if (t->frames != t->data.features) free(t->frames);
     vgi_dataset_clear(&t->data);
     vg_mesh_clear(&t->mesh);
     vg_featurer_free(&t->featurer);
     free(t->last);
-    free(t->frames);
     free(t->moments);
-    free(t->best);
+    vgi_best_clear(&t->best);
     free(t);
     *out = NULL;
     vgi_ranks_end();
@@ -305,19 +305,23 @@ static int make_groups(vg_trainer *t, vg_err *e)
     if (!t->groups || !t->gradient || !t->total) return VG_ENOMEM;
     t->ngradients = t->ngroups > t->at_once ? t->at_once : t->at_once - 1;
     for (size_t i = 0; i < t->at_once; i++)
-        if ((i < t->ngradients && !(t->gradient[i] = vgi_array(all, sizeof **t->gradient, e))) ||
-            net_group_make(&t->groups[i], &t->shape, t->o.direction, t->length, e) < 0)
-            return VG_ENOMEM;
+        if (net_group_make(&t->groups[i], &t->shape, t->o.direction, t->length, 0, e) < 0) return VG_ENOMEM;
+    t->left_out = t->groups[0].chains[0].late ? t->shape.numbers * t->shape.latent : 0;
+    for (size_t i = 0; i < t->ngradients; i++)
+        if (!(t->gradient[i] = vgi_array(all - t->left_out, sizeof **t->gradient, e))) return VG_ENOMEM;
     return VG_OK;
 }
 
 static int start_parameters(vg_trainer *t, vg_err *e)
 {
     size_t one = t->net.nparameters, all = t->net.sets * one;
-    if (!t->net.parameters && (!(t->net.parameters = vgi_array(all, sizeof *t->net.parameters, e)) ||
-                               !(t->moments = vgi_array(2 * all, sizeof *t->moments, e)) ||
-                               !(t->best = vgi_array(all, sizeof *t->best, e))))
-        return VG_ENOMEM;
+    if (!t->net.parameters) {
+        t->net.parameters = vgi_array(all, sizeof *t->net.parameters, e);
+        t->moments = vgi_array(2 * all, sizeof *t->moments, e);
+        if (!t->net.parameters || !t->moments) return VG_ENOMEM;
+        int r = vgi_best_make(&t->best, all, MOST_BEST, e);
+        if (r < 0) return r;
+    }
     memset(t->moments, 0, 2 * all * sizeof *t->moments);
     for (size_t w = 0; w < t->net.sets; w++)
         if (vgi_shape_start(&t->shape, t->o.seed + 1000003 * w, t->o.model == VG_NETWORK_AUTO, t->net.parameters + w * one, e) < 0)
@@ -347,15 +351,14 @@ static int begin_phase(vg_trainer *t, bool validate, vg_err *e)
 static int make_frames(vg_trainer *t, vg_err *e)
 {
     size_t n = t->net.numbers;
-    t->frames = vgi_array_raw(t->data.n * n, sizeof *t->frames, e);
-    double *x = vgi_array_raw(t->data.d, sizeof *x, e);
-    if (!t->frames || !x) return free(x), VG_ENOMEM;
-    for (size_t i = 0; i < t->data.n; i++) {
-        if (vgi_network_is_linear(&t->net)) memcpy(x, t->data.coordinates + i * n, n * sizeof *x);
-        else vgi_dataset_normalised(&t->data, &t->net, i, x);
-        for (size_t k = 0; k < n; k++) t->frames[i * n + k] = (float)x[k];
+    if (!vgi_network_is_linear(&t->net)) {
+        vgi_dataset_normalise(&t->data, &t->net);
+        t->frames = t->data.features;
+        return VG_OK;
     }
-    free(x);
+    t->frames = vgi_array_raw(t->data.n * n, sizeof *t->frames, e);
+    if (!t->frames) return VG_ENOMEM;
+    for (size_t i = 0; i < t->data.n * n; i++) t->frames[i] = (float)t->data.coordinates[i];
     return VG_OK;
 }
 
@@ -390,75 +393,6 @@ int vg_trainer_prepare(vg_trainer *t, vg_err *e)
 }
 
 /* ---- an iteration ---- */
-
-typedef struct working {
-    vg_trainer *t;
-    size_t first;  /* the group in the first buffer */
-    size_t given, *start;
-    bool single; /* sequences start with the frames that the regression puts before a single one */
-    net_loss loss[64];
-} working;
-
-/* The gradient of a group: the first one's is where the sum of all is made. */
-static float *gradient_of(const vg_trainer *t, size_t first, size_t i)
-{
-    return first + i ? t->gradient[i - !first] : t->total;
-}
-
-/* With n ranks, this process computes every nth group. */
-static void run_group(void *context, size_t number)
-{
-    working *w = context;
-    vg_trainer *t = w->t;
-    size_t i = number * vgi_ranks() + vgi_rank();
-    net_group *g = &t->groups[i];
-    size_t size = vgi_group_size(t->o.direction), first = (w->first + i) * size, one = t->net.nparameters;
-    net_drive d[2];
-    float *all = gradient_of(t, w->first, i), *gradient[2] = {all, all + (t->net.sets > 1 ? one : 0)};
-    memset(all, 0, t->net.sets * one * sizeof *all);
-    g->n = t->o.batch - first < size ? t->o.batch - first : size;
-    for (size_t k = 0; k < g->n; k++) g->start[k] = w->start[first + k];
-    g->frames = t->frames, g->batch = t->o.batch, g->before = w->single ? t->before : NULL;
-    g->bidirectional = t->o.direction == VG_FORWARD ? 0 : t->o.bidirectional;
-    g->divergence = t->net.uncertain ? t->o.divergence : 0;
-    for (int k = 0; k < 2; k++) {
-        d[k] = t->runner.drive;
-        d[k].shape = &t->shape, d[k].given = w->given;
-        d[k].parameters = t->net.parameters + (k && t->net.sets > 1 ? one : 0);
-    }
-    w->loss[i % 64] = net_group_run(g, d, gradient, 0.1,
-                               vgi_random_mix(t->o.seed * 7919 + t->state.iteration) + w->first + i);
-}
-
-/* the gradient of one iteration, in t->total */
-static int run_groups(vg_trainer *t, double *loss, vg_err *e)
-{
-    size_t all = t->net.sets * t->net.nparameters;
-    vgi_random numbers = vgi_random_start(t->o.seed, t->state.iteration + 1);
-    working w = {.t = t, .start = vgi_array_raw(t->o.batch, sizeof *w.start, e)};
-    if (!w.start) return VG_ENOMEM;
-    for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&numbers, t->nwindows)];
-    w.given = t->o.given_least + vgi_random_below(&numbers, t->o.given_most - t->o.given_least + 1);
-    if (w.given >= t->length) w.given = t->length - 1;
-    w.single = t->before && t->length > 3 && vgi_random_below(&numbers, SINGLE) == 0;
-    if (w.single) w.given = 3;
-    *loss = 0;
-    vgi_blas_alone();
-    for (w.first = 0; w.first < t->ngroups; w.first += t->at_once) {
-        size_t n = t->ngroups - w.first < t->at_once ? t->ngroups - w.first : t->at_once, own = vgi_rank(), ranks = vgi_ranks();
-        vgi_parallel(t->o.threads, n > own ? (n - own - 1) / ranks + 1 : 0, run_group, &w);
-        for (size_t i = 0; i < n; i++) {
-            float *one = gradient_of(t, w.first, i);
-            vgi_ranks_share(i % ranks, one, all);
-            vgi_ranks_share_double(i % ranks, &w.loss[i % 64].frames, 1);
-            *loss += w.loss[i % 64].frames;
-            for (size_t k = 0; one != t->total && k < all; k++) t->total[k] += one[k];
-        }
-    }
-    vgi_blas_shared();
-    free(w.start);
-    return VG_OK;
-}
 
 typedef struct adam {
     float *p, *first, *second, *gradient;
@@ -510,16 +444,16 @@ static void end_training(vg_trainer *t)
     t->ended = true;
     clear_gradients(t);
     free(t->moments);
-    free(t->best);
-    t->moments = t->best = NULL;
+    vgi_best_clear(&t->best);
+    t->moments = NULL;
 }
 
-static void keep_best(vg_trainer *t, double error)
+static int keep_best(vg_trainer *t, double error, vg_err *e)
 {
-    if (!(error < t->best_error)) return;
+    if (!(error < t->best_error)) return VG_OK;
     t->best_error = error;
     t->state.best_iteration = t->state.iteration;
-    memcpy(t->best, t->net.parameters, t->net.sets * t->net.nparameters * sizeof *t->best);
+    return vgi_best_put(&t->best, t->net.parameters, e);
 }
 
 /* Set the correction to zero, so that the regression is used alone. */
@@ -538,9 +472,9 @@ static int end_phase(vg_trainer *t, vg_err *e)
 {
     uint64_t best = t->state.best_iteration;
     if (t->o.model != VG_NETWORK_AUTO) {
-        memcpy(t->net.parameters, t->best, t->net.sets * t->net.nparameters * sizeof *t->best);
+        int r = vgi_best_get(&t->best, t->net.parameters, e);
         end_training(t);
-        return VG_OK;
+        return r;
     }
     if (begin_phase(t, false, e) < 0) return e ? e->code : VG_ENOMEM;
     t->state.iterations = best;
@@ -559,8 +493,7 @@ static int validate(vg_trainer *t, vg_err *e)
     int r = vgi_trainer_validate(t, &error, e);
     if (r < 0) return r;
     t->state.validation = error;
-    keep_best(t, error);
-    return VG_OK;
+    return keep_best(t, error, e);
 }
 
 static bool has_waited(const vg_trainer *t)
@@ -607,7 +540,7 @@ int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
         *state = t->state;
         return r;
     }
-    r = run_groups(t, &loss, e);
+    r = vgi_trainer_gradient(t, &loss, e);
     if (r < 0) return r;
     train_iteration(t);
     t->state.loss = loss;
@@ -642,7 +575,9 @@ int vg_trainer_network(const vg_trainer *t, bool complete, vg_network *n, vg_err
     vg_network view = t->net;
     if (!complete && !t->ended) {
         view.open = true;
-        view.moments = t->moments, view.best = t->best;
+        view.moments = t->moments, view.best = t->total; /* which is free between iterations */
+        int r = vgi_best_get(&t->best, t->total, e);
+        if (r < 0) return r;
         view.phase = (uint64_t)t->state.phase, view.best_iteration = t->state.best_iteration, view.best_error = t->best_error;
         if (!(view.best_error < INFINITY)) view.best_error = -1;
     }
@@ -661,9 +596,10 @@ int vg_trainer_resume(vg_trainer *t, const vg_network *from, vg_err *e)
         return vg_fail(e, VG_EINPUT, "it was trained with other options");
     int r = from->phase && !t->state.phase ? begin_phase(t, false, e) : VG_OK;
     if (r < 0) return r;
-    memcpy(t->net.parameters, from->parameters, all * sizeof *t->best);
-    memcpy(t->moments, from->moments, 2 * all * sizeof *t->best);
-    memcpy(t->best, from->best, all * sizeof *t->best);
+    memcpy(t->net.parameters, from->parameters, all * sizeof *t->moments);
+    memcpy(t->moments, from->moments, 2 * all * sizeof *t->moments);
+    r = vgi_best_put(&t->best, from->best, e);
+    if (r < 0) return r;
     free(t->net.curve);
     t->net.curve = vgi_copy_array(from->curve, 3 * from->ncurve, sizeof *from->curve, e);
     if (!t->net.curve) return t->net.ncurve = 0, VG_ENOMEM;

@@ -22,6 +22,7 @@ typedef struct trial {
     vg_direction direction;
     size_t given, sequences;
     double bidirectional, divergence;
+    size_t apart; /* of the states that are kept; 0: all are */
 } trial;
 
 typedef struct rig {
@@ -47,7 +48,7 @@ static void start(rig *r, const trial *x)
     r->shape = (vgi_shape){.front = x->front, .vertices = RING, .channels = x->channels, .hidden = 6, .layers = 3,
                            .convolutions = x->convolutions, .uncertain = x->uncertain, .first = first_of, .to = to_of};
     CHECK(vgi_shape_plan(&r->shape, &e) == VG_OK);
-    CHECK(net_group_make(&r->group, &r->shape, x->direction, STEPS, &e) == VG_OK);
+    CHECK(net_group_make(&r->group, &r->shape, x->direction, STEPS, x->apart, &e) == VG_OK);
     size_t n = r->shape.numbers;
     r->frames = numbers(FRAMES * n, 0.4), r->matrices = numbers(8 * n * n + 2 * n, 0.1);
     r->in = numbers(n, 1), r->out = numbers(n, 1);
@@ -72,6 +73,18 @@ static void end(rig *r)
     free(r->frames), free(r->matrices), free(r->in), free(r->out);
 }
 
+/* The gradient as the parameters are laid out. */
+static void find_gradient(rig *r, real *const gradient[2])
+{
+    const vgi_shape *s = &r->shape;
+    size_t left_out = r->group.chains[0].late ? s->numbers * s->latent : 0, behind = s->total - s->variance - left_out;
+    net_group_run(&r->group, r->drive, gradient, 0.1, 5);
+    if (!left_out) return;
+    memmove(gradient[0] + s->variance + left_out, gradient[0] + s->variance, behind * sizeof **gradient);
+    memset(gradient[0] + s->variance, 0, left_out * sizeof **gradient);
+    net_group_variance(&r->group, r->drive, gradient[0] + s->variance);
+}
+
 static double loss_at(rig *r, real *const gradient[2])
 {
     return net_group_run(&r->group, r->drive, gradient, 0.1, 5).total;
@@ -81,7 +94,7 @@ static void check_gradient(const trial *x)
 {
     rig r = {0};
     start(&r, x);
-    loss_at(&r, r.gradient);
+    find_gradient(&r, r.gradient);
     real *ignored[2] = {numbers(r.shape.total, 0), numbers(r.shape.total, 0)};
     for (int w = 0; w < (x->direction == VG_SEPARATE ? 2 : 1); w++) {
         double worst = 0, largest = 0;
@@ -110,21 +123,51 @@ static void check_gradient(const trial *x)
 static void gradients(void)
 {
     static const trial trials[] = {
-        {"coordinates", VGI_FRONT_LINEAR, 1, 0, false, false, VG_SHARED, 2, 3, 0.5, 0},
-        {"coordinates, regression", VGI_FRONT_LINEAR, 1, 0, false, true, VG_SHARED, 2, 4, 0.5, 0},
-        {"coordinates, regression, one given", VGI_FRONT_LINEAR, 1, 0, false, true, VG_SHARED, 1, 4, 0.5, 0},
-        {"coordinates, all given", VGI_FRONT_LINEAR, 1, 0, false, true, VG_SHARED, STEPS, 4, 0.5, 0},
-        {"coordinates, forward", VGI_FRONT_LINEAR, 1, 0, false, true, VG_FORWARD, 3, 5, 0, 0},
-        {"coordinates, separate", VGI_FRONT_LINEAR, 1, 0, false, true, VG_SEPARATE, 1, 5, 0.5, 0},
-        {"full layer", VGI_FRONT_MESH, 9, 0, false, false, VG_SHARED, 1, 4, 0.5, 0},
-        {"full layer, uncertain", VGI_FRONT_MESH, 9, 0, true, false, VG_SHARED, 2, 4, 0.5, 0.1},
-        {"convolutions", VGI_FRONT_MESH, 9, 3, false, false, VG_SHARED, 1, 4, 0.5, 0},
-        {"convolutions of 12", VGI_FRONT_MESH, 12, 3, false, false, VG_SHARED, 3, 2, 0.5, 0},
-        {"convolutions of 5", VGI_FRONT_MESH, 5, 2, false, false, VG_SHARED, 1, 4, 0, 0},
-        {"convolutions, uncertain", VGI_FRONT_MESH, 9, 3, true, false, VG_SHARED, 1, 3, 0.5, 0.1},
-        {"convolutions, separate, uncertain", VGI_FRONT_MESH, 9, 3, true, false, VG_SEPARATE, 2, 8, 0.5, 0.1},
-        {"convolutions, forward", VGI_FRONT_MESH, 9, 1, true, false, VG_FORWARD, 1, 8, 0, 0.1}};
+        {"coordinates", VGI_FRONT_LINEAR, 1, 0, false, false, VG_SHARED, 2, 3, 0.5, 0, 0},
+        {"coordinates, regression", VGI_FRONT_LINEAR, 1, 0, false, true, VG_SHARED, 2, 4, 0.5, 0, 0},
+        {"coordinates, regression, one given", VGI_FRONT_LINEAR, 1, 0, false, true, VG_SHARED, 1, 4, 0.5, 0, 0},
+        {"coordinates, all given", VGI_FRONT_LINEAR, 1, 0, false, true, VG_SHARED, STEPS, 4, 0.5, 0, 0},
+        {"coordinates, forward", VGI_FRONT_LINEAR, 1, 0, false, true, VG_FORWARD, 3, 5, 0, 0, 0},
+        {"coordinates, separate", VGI_FRONT_LINEAR, 1, 0, false, true, VG_SEPARATE, 1, 5, 0.5, 0, 0},
+        {"full layer", VGI_FRONT_MESH, 9, 0, false, false, VG_SHARED, 1, 4, 0.5, 0, 0},
+        {"full layer, uncertain", VGI_FRONT_MESH, 9, 0, true, false, VG_SHARED, 2, 4, 0.5, 0.1, 0},
+        {"convolutions", VGI_FRONT_MESH, 9, 3, false, false, VG_SHARED, 1, 4, 0.5, 0, 0},
+        {"convolutions of 12", VGI_FRONT_MESH, 12, 3, false, false, VG_SHARED, 3, 2, 0.5, 0, 0},
+        {"convolutions of 5", VGI_FRONT_MESH, 5, 2, false, false, VG_SHARED, 1, 4, 0, 0, 0},
+        {"convolutions, uncertain", VGI_FRONT_MESH, 9, 3, true, false, VG_SHARED, 1, 3, 0.5, 0.1, 0},
+        {"convolutions, separate, uncertain", VGI_FRONT_MESH, 9, 3, true, false, VG_SEPARATE, 2, 8, 0.5, 0.1, 0},
+        {"convolutions, forward", VGI_FRONT_MESH, 9, 1, true, false, VG_FORWARD, 1, 8, 0, 0.1, 0},
+        {"convolutions, half of the states", VGI_FRONT_MESH, 9, 3, false, false, VG_SHARED, 1, 4, 0.5, 0, 2},
+        {"convolutions, uncertain, a third of the states", VGI_FRONT_MESH, 9, 3, true, false, VG_SHARED, 2, 3, 0.5, 0.1, 3},
+        {"full layer, uncertain, the first state", VGI_FRONT_MESH, 9, 0, true, false, VG_SHARED, 1, 4, 0.5, 0.1, STEPS},
+        {"convolutions, forward, half of the states", VGI_FRONT_MESH, 9, 1, true, false, VG_FORWARD, 1, 8, 0, 0.1, 2}};
     for (size_t i = 0; i < sizeof trials / sizeof *trials; i++) check_gradient(&trials[i]);
+}
+
+/* States that are computed again are the same to the last bit, and so is all that is made of them, but for the
+ * gradient of the variance, whose steps are added in another order. */
+static void states_again(void)
+{
+    trial x = {"", VGI_FRONT_MESH, 9, 3, true, false, VG_SHARED, 2, 4, 0.5, 0.1, 1};
+    for (size_t apart = 2; apart <= STEPS; apart++) {
+        rig all = {0}, some = {0};
+        x.apart = 1;
+        start(&all, &x);
+        x.apart = apart;
+        start(&some, &x);
+        const vgi_shape *s = &all.shape;
+        size_t matrix = s->numbers * s->latent;
+        memcpy(some.frames, all.frames, FRAMES * s->numbers * sizeof *all.frames);
+        memcpy(some.parameters[0], all.parameters[0], s->total * sizeof *all.gradient[0]);
+        find_gradient(&all, all.gradient);
+        find_gradient(&some, some.gradient);
+        CHECK(!all.group.chains[0].late && some.group.chains[0].late);
+        for (size_t i = 0; i < s->total; i++)
+            if (i < s->variance || i >= s->variance + matrix) CHECK(all.gradient[0][i] == some.gradient[0][i]);
+            else CHECK_NEAR(all.gradient[0][i], some.gradient[0][i], 1e-13);
+        end(&all);
+        end(&some);
+    }
 }
 
 /* ---- initial states ---- */
@@ -166,7 +209,7 @@ static double miss(net_chains *c, const net_drive *d, const net_lanes *begin_at,
 static void initial_states(void)
 {
     vg_err e;
-    trial x = {"", VGI_FRONT_MESH, 9, 2, false, false, VG_SHARED, 1, 4, 0.5, 0};
+    trial x = {"", VGI_FRONT_MESH, 9, 2, false, false, VG_SHARED, 1, 4, 0.5, 0, 0};
     rig r = {0};
     start(&r, &x);
     size_t n = r.shape.numbers, rows = 2 * r.shape.layers * r.shape.hidden;
@@ -199,7 +242,7 @@ static void initial_states(void)
 /* Over a palindrome, chains that begin alike run alike. */
 static void palindrome(void)
 {
-    trial x = {"", VGI_FRONT_MESH, 9, 3, false, false, VG_SHARED, 1, 1, 0.5, 0};
+    trial x = {"", VGI_FRONT_MESH, 9, 3, false, false, VG_SHARED, 1, 1, 0.5, 0, 0};
     rig r = {0};
     start(&r, &x);
     size_t n = r.shape.numbers;
@@ -212,4 +255,4 @@ static void palindrome(void)
     end(&r);
 }
 
-TESTS({"gradients", gradients}, {"initial states", initial_states}, {"palindrome", palindrome})
+TESTS({"gradients", gradients}, {"states computed again", states_again}, {"initial states", initial_states}, {"palindrome", palindrome})
