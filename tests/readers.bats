@@ -229,7 +229,23 @@ EOF
     says "'fewer.bvh' ends in frame 2 of 5"
     { cat frames_more.bvh; echo '1 2 3'; } >part.bvh
     must_fail 3 vg-encode part.bvh -o out.vgs
-    says "'part.bvh' line 21: a row has 3 values"
+    says "'part.bvh' line 21: row 3 has 3 values"
+    # two rows on one line, one row on two lines; but all rows may be on two lines each
+    local head
+    head=$(sed '/^Frame Time/q; s/Frames: 1/Frames: 4/' frames_more.bvh)
+    printf '%s\n' "$head" '1 2 3 4 5 6 7 8 9' '1 2 3 4 5 6 7 8 9 1 2 3 4 5 6 7 8 9' '1 2 3 4 5 6 7 8 9' >two.bvh
+    must_fail 3 vg-encode two.bvh -o out.vgs
+    says "'two.bvh' line 20: row 2 has 18 values, but there are 9 channels"
+    printf '%s\n' "$head" '1 2 3 4 5 6 7 8 9' '1 2 3 4 5 6 7' '8 9' '1 2 3 4 5 6 7 8 9' '1 2 3 4 5 6 7 8 9' >half.bvh
+    must_fail 3 vg-encode half.bvh -o out.vgs
+    says "'half.bvh' line 20: row 2 has 7 values, but there are 9 channels"
+    printf '%s\n' "$head" '1 2 3 4 5 6 7' '8 9' '1 2 3 4 5 6 7 8 9' '1 2 3 4 5 6 7 8 9' '1 2 3 4 5 6 7 8 9' >half.bvh
+    must_fail 3 vg-encode half.bvh -o out.vgs
+    says "'half.bvh' line 19: row 1 has 7 values, but there are 9 channels"
+    { printf '%s\n' "$head"; for i in 1 2 3 4; do printf '%s\n' '1 2 3 4 5 6 7' '8 9'; done; } >halves.bvh
+    must vg-encode halves.bvh -o out.vgs
+    pipe 'vg-info out.vgs'
+    shows 'frames     4'
     # no motion: a skeleton with a branch, and one in small letters with a mark and Windows' line ends
     printf 'HIERARCHY\nROOT a\n{\nOFFSET 1 2 3\nCHANNELS 3 Zrotation Xrotation Yrotation\nJOINT b\n{\nOFFSET 0 1 0\nCHANNELS 0\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\nJOINT c\n{\nOFFSET 1 0 0\nCHANNELS 0\nEndSite\n{\nOFFSET 1 0 0\n}\n}\n}\n' >branch.bvh
     geometry branch.bvh

@@ -89,11 +89,11 @@ EOF
     printf '0 0 0 0 0 0 0 0\n1 2 3 10 20 30 40 50 60 70\n' >>shifted.bvh
     must_fail 3 vg-encode shifted.bvh -o out.vgs
     one_line
-    says "'shifted.bvh' line 19: a row has 8 values, but there are 9 channels"
+    says "'shifted.bvh' line 19: row 1 has 8 values, but there are 9 channels"
     head -n 19 frames_more.bvh >long.bvh
     printf '1 2 3 10 20 30 40 50 60 70\n' >>long.bvh
     must_fail 3 vg-encode long.bvh -o out.vgs
-    says "'long.bvh' line 20: a row has 10 values"
+    says "'long.bvh' line 20: row 2 has 10 values"
     cat >scales.bvh <<'EOF'
 HIERARCHY
 ROOT Hips

@@ -305,13 +305,17 @@ static int read_motion_head(reading *b, vg_err *e)
 
 /* ---- rows ---- */
 
-/* How the numbers after the header are arranged in lines. */
+/* A row of the motion, which may be several lines. */
+typedef struct row {
+    const char *at;
+    uint64_t number;    /* from 1 */
+    size_t values;      /* of its first line */
+    size_t lines;
+} row;
+
 typedef struct rows {
-    uint64_t values, lines;
-    const char *wrong; /* the first line that does not hold one row; NULL if all do */
-    size_t has;        /* number of values in it */
-    bool aligned;      /* no row starts in mid-line and continues on the next: one row takes whole lines, or one line
-                          whole rows */
+    uint64_t values;
+    row first, now, wrong; /* wrong: the first row at fault, with no lines if there is none */
 } rows;
 
 static size_t count_words(const char *p, const char *end)
@@ -325,32 +329,46 @@ static size_t count_words(const char *p, const char *end)
     return n;
 }
 
+static void set_wrong(rows *k, row r)
+{
+    if (!k->wrong.lines) k->wrong = r;
+}
+
+/* A row is one line, or all rows are as many lines each: `room` values are left to the row that this line of n values belongs
+ * to. */
+static void take_line(rows *k, const char *line, size_t n, size_t room, bool begins)
+{
+    if (begins) k->now = (row){line, k->now.number + 1, n, 0};
+    k->now.lines++;
+    if (n > room) set_wrong(k, k->now);
+    if (n == room && !k->first.lines) k->first = k->now;
+    if (n == room && k->now.lines != k->first.lines) set_wrong(k, k->now.lines > 1 ? k->now : k->first);
+    k->values += n;
+}
+
 static rows look_at_rows(const reading *b)
 {
     const size_t width = b->kept.size;
-    rows k = {.aligned = true};
+    rows k = {0};
     for (const char *p = b->at, *stop; p < b->end; p = stop + 1) {
         for (stop = p; stop < b->end && !is_line_end(*stop);) stop++;
         const size_t n = count_words(p, stop), before = (size_t)(k.values % width);
-        if (n != width && n && !k.wrong) k.wrong = p, k.has = n;
-        if (before ? n > width - before : n > width && n % width) k.aligned = false;
-        k.values += n, k.lines += n > 0;
+        if (n) take_line(&k, p, n, width - before, !before);
     }
+    if (k.values % width && k.values / width >= b->frames) set_wrong(&k, k.now);
     return k;
 }
 
-/* Rows may be wrapped anywhere if the number of values is right. But if lines are rows, a missing value would shift
- * all that follow. A truncated file is reported when its end is reached. */
+/* A missing value would shift all that follow. A truncated file is reported when its end is reached. */
 static int check_rows(reading *b, vg_err *e)
 {
     const size_t width = b->kept.size;
     if (width == 0) return VG_OK;
     const rows k = look_at_rows(b);
+    if (k.wrong.lines)
+        return vg_fail(e, VG_EINPUT, "%s line %zu: row %llu has %zu values, but there are %zu channels", b->subject,
+                       line_of(b, k.wrong.at), (unsigned long long)k.wrong.number, k.wrong.values, width);
     const uint64_t whole = k.values / width;
-    const bool free_lines = k.values % width == 0 && whole == b->frames && k.lines != b->frames;
-    if (k.wrong && !free_lines && !(k.aligned && (whole < b->frames || k.values % width == 0)))
-        return vg_fail(e, VG_EINPUT, "%s line %zu: a row has %zu values, but there are %zu channels", b->subject,
-                       line_of(b, k.wrong), k.has, width);
     if (whole <= b->frames) return VG_OK;
     vgi_note(&b->note, "it announces %llu frames but holds %llu, which are read", (unsigned long long)b->frames,
              (unsigned long long)whole);

@@ -159,7 +159,7 @@ static void reads_what_people_have(void)
         "\xef\xbb\xbf\r\n hierarchy\r\n\troot  Left Hip \t{ offset 1e0 -2.5E-1 +.5\r\n channels 1 YPOSITION "
         "joint a b{\r\nOFFSET 0 0 1 CHANNELS 0 End Site the end\r\n{ OFFSET 0 0 0 } }\r\njoint \r\n{\r\nCHANNELS 2 Xrotation "
         "Xposition OFFSET 1 2 3 }\r\n}\r\nROOT caf\xe9\r\n{\r\nOFFSET 5 5 5\r\nCHANNELS 0\r\n}\r\nmotion\r\nFRAMES 2\r\n"
-        "frame time:.04\r\n 7\r\n\r\n90 8\t 1\r\n2 3  \r\n\r\n ";
+        "frame time:.04\r\n 7\r\n\r\n90 8\t \r\n 1\r\n2 3  \r\n\r\n ";
     sequence s;
     vg_err e = {0};
     CHECK(read_text(&s, text, &e) == VG_OK);
@@ -232,7 +232,7 @@ static void refuses(void)
     check_refused(ARM("0", "Frames: 1000000000000000000\nFrame Time: 1\n1 2 3 4 5 6\n"),
                   VG_ETRUNC, "ends in frame 1 of");
     check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 6 7\n"),
-                  VG_EINPUT, "line 19: a row has 7 values, but there are 6 channels");
+                  VG_EINPUT, "line 19: row 1 has 7 values, but there are 6 channels");
     check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 x\n"),
                   VG_EINPUT, "line 19: a number expected, not 'x'");
     check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 1e999\n"), VG_EINPUT, "not a finite number");
