@@ -215,6 +215,31 @@ EOF
     must_fail 3 vg-encode cut.stl -o out.vgs
 }
 
+@test "STL: colours as VisCAM and Materialise keep them, in the attribute bytes, are left out with a word, whatever the size" {
+    py <<'END'
+import struct
+def stl(name, n, attribute, head=b""):
+    rows = [struct.pack("<12fH", 0, 0, 1, i, 0, 0, i + 1, 0, 0, i, 1, 0, attribute(i)) for i in range(n)]
+    open(name, "wb").write(head.ljust(80, b" ") + struct.pack("<I", n) + b"".join(rows))
+stl("viscam.stl", 3, lambda i: 0x8000 | 31 << 10 if i else 0)
+stl("large.stl", 5000, lambda i: 0x8000 | i)
+stl("materialise.stl", 5000, lambda i: i, b"solid COLOR=\x10\x20\x30\xff,MATERIAL=")
+stl("plain.stl", 5000, lambda i: 0)
+END
+    must_warn vg-encode viscam.stl -o out.vgs
+    one_line
+    says "'viscam.stl': left out the attribute bytes of 2 triangles, which may be colours"
+    geometry plain.stl
+    local truth=$output name
+    for name in large:5000 materialise:4999; do
+        capture vg-encode - -o out.vgs <${name%:*}.stl # known by its content, of which the beginning is seen
+        [ "$status" = 0 ] || fail "$stderr"
+        says "left out the attribute bytes of ${name#*:} triangles"
+        geometry ${name%:*}.stl
+        [ "$output" = "$truth" ] || fail "other triangles"
+    done
+}
+
 @test "BVH: blank lines between rows, no announced frame, fewer rows, no motion, marks and line ends" {
     cp "$DATA"/reports/*.bvh .
     { cat frames_more.bvh; printf '\n\n1 2 3 1 1 1 1 1 1\n\n'; } >blank.bvh

@@ -1,5 +1,5 @@
-/* stl.c: STL, text and binary: triangles, each with its own three corners. Normals, colours and names of solids are
- * skipped.
+/* stl.c: STL, text and binary: triangles, each with its own three corners. Normals and names of solids are skipped; so are
+ * the two bytes behind a triangle of a binary file, in which some programs keep its colour, but these are counted.
  *
  * A corner has no number in STL. Corners at exactly the same position (-0 is 0) become one vertex, numbered in order
  * of first appearance; near positions are not merged. A triangle with two corners at one position is not a face: it
@@ -23,6 +23,7 @@ struct reading {
     vg_err *e;
     vg_model *m;
     size_t vertices_cap, start_cap, vert_cap, triangles, dropped;
+    size_t marked;   /* triangles with attribute bytes */
     uint32_t *slots; /* hash table of vertices + 1; 0: free; nslots is a power of two */
     size_t nslots;
 };
@@ -110,6 +111,11 @@ static float float_at(const char *p)
     return vgi_as_float(vgi_get32((const unsigned char *)p));
 }
 
+static bool has_attribute(const char *facet)
+{
+    return facet[48] || facet[49];
+}
+
 static int read_binary(struct reading *in)
 {
     size_t n = (size_t)(in->end - in->data);
@@ -126,8 +132,11 @@ static int read_binary(struct reading *in)
     for (uint64_t i = 0; i < count && r == VG_OK; i++, p += FACET) {
         double x[9];
         for (int k = 0; k < 9; k++) x[k] = float_at(p + 12 + 4 * k);
+        in->marked += has_attribute(p);
         r = add_triangle(in, x);
     }
+    if (in->marked)
+        vgi_note(&in->m->note, "left out the attribute bytes of %zu triangles, which may be colours", in->marked);
     return r;
 }
 
@@ -253,8 +262,19 @@ static bool starts_as_text(const unsigned char *data, size_t n)
     return n > 5 && !strncasecmp((const char *)data, "solid", 5) && is_space((char)data[5]);
 }
 
+/* The corners of a triangle are finite; and with attribute bytes, its normal has length 1 or 0. */
+static bool looks_like_facet(const char *p)
+{
+    double length = 0;
+    for (int k = 0; k < 9; k++)
+        if (!(fabsf(float_at(p + 12 + 4 * k)) < 1e20f)) return false;
+    if (!has_attribute(p)) return true;
+    for (int k = 0; k < 3; k++) length += (double)float_at(p + 4 * k) * (double)float_at(p + 4 * k);
+    return length == 0 || (length > 0.9 && length < 1.1);
+}
+
 /* Whether it looks like binary STL, whose header may begin like text. The count agrees with the size; or, for the
- * start of a larger file, the triangles seen have finite corners and no attribute. */
+ * start of a larger file, the triangles seen look like triangles. */
 static bool looks_binary(const unsigned char *data, size_t n)
 {
     if (n < HEADER + FACET) return n == HEADER && vgi_get32(data + COUNT_OFF) == 0;
@@ -263,12 +283,8 @@ static bool looks_binary(const unsigned char *data, size_t n)
     if (count == 0) return false;
     if (seen > count) seen = count; /* bytes after the last triangle */
     if (seen > 80) seen = 80;
-    for (uint64_t i = 0; i < seen; i++) {
-        const unsigned char *p = data + HEADER + i * FACET;
-        if (p[48] || p[49]) return false;
-        for (int k = 0; k < 9; k++)
-            if (!(fabsf(float_at((const char *)p + 12 + 4 * k)) < 1e20f)) return false;
-    }
+    for (uint64_t i = 0; i < seen; i++)
+        if (!looks_like_facet((const char *)data + HEADER + i * FACET)) return false;
     return true;
 }
 
