@@ -5,6 +5,7 @@
 #include "raw.h"
 #include "take.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -141,6 +142,8 @@ typedef struct work {
     uint32_t *anchors; /* of --anchor */
     size_t nanchors;
     uint64_t read, written;
+    uint64_t since;   /* frames written of this animation, */
+    double last_time; /* and the time that the last one read had */
     vg_head *h;
     vg_graph *g; /* NULL: frames are written as they come */
     vg_frame vectors;
@@ -171,14 +174,23 @@ static vg_frame *to_vectors(work *w, vg_frame *in)
     return out;
 }
 
+/* A file of several animations counts each from 0: "Run.0001" is earlier than the frame before it. */
+static bool begins_animation(const work *w, const vg_frame *f)
+{
+    uint64_t number;
+    return f->has_time && f->time <= w->last_time && vg_frame_stem(f->name, &number) && number == 1;
+}
+
 static void encode_batch(void *context, size_t n, vg_frame *in)
 {
     work *w = context;
     for (size_t i = 0; i < n; i++) {
+        if (w->read > 0 && begins_animation(w, &in[i])) w->since = 0;
+        w->last_time = in[i].has_time ? in[i].time : HUGE_VAL;
         if (!take_wants(&opts.take, w->read++)) continue;
         if (placing_wanted(&opts.placing)) placing_frame(&opts.placing, &in[i]);
         vg_frame *f = w->g ? to_vectors(w, &in[i]) : &in[i];
-        if (opts.fps > 0) f->has_time = true, f->time = (double)w->written / opts.fps;
+        if (opts.fps > 0) f->has_time = true, f->time = (double)w->since++ / opts.fps;
         cli_stream_put(f);
         w->written++;
     }

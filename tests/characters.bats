@@ -92,6 +92,160 @@ END
     [ "$(cat counts)" = "0 0" ]
 }
 
+# Wave turns a joint, Nod moves a node, and Look turns only the camera; Ball has a sparse shape "wide" and a plain one "tall" with
+# normals and tangents, and a default weight for each. kept FILE ANIMATION...: FILE has what in.glb has, with these animations.
+make_rich() {
+    cat >rich.py <<'END'
+import json, struct, sys
+import make_character
+def make():
+    m, d = make_character.character()
+    turns = m.add([[0, 0, 0, 1], [0, 0.6, 0, 0.8]])
+    d["animations"].append({"name": "Look", "channels": [{"sampler": 0, "target": {"node": 5, "path": "rotation"}}],
+                            "samplers": [{"input": m.add([0.0, 1.0], bounds=True), "output": turns}]})
+    ball = d["meshes"][1]
+    ball["weights"], ball["extras"] = [0.25, 0.5], {"targetNames": ["wide", "tall"], "note": "kept"}
+    primitive = ball["primitives"][0]
+    which = m.view(struct.pack("<2H", 3, 20))
+    values = m.view(struct.pack("<6f", 1, 0, 0, 0.5, 0, 0))
+    m.accessors.append({"componentType": 5126, "count": 24, "type": "VEC3", "min": [0, 0, 0], "max": [1, 0, 0], "sparse":
+        {"count": 2, "indices": {"bufferView": which, "componentType": 5123}, "values": {"bufferView": values}}})
+    wide = len(m.accessors) - 1
+    tall = m.add([[0, i / 24, 0] for i in range(24)], target=34962, bounds=True)
+    turned = m.add([[0, 0, i / 100] for i in range(24)], target=34962)
+    primitive["attributes"]["TANGENT"] = m.add([[1, 0, 0, 1]] * 24, target=34962)
+    primitive["targets"] = [{"POSITION": wide}, {"POSITION": tall, "NORMAL": turned, "TANGENT": turned}]
+    d["buffers"][0]["byteLength"] = len(m.data)
+    open("in.glb", "wb").write(make_character.glb(d, m.data))
+def load(name):
+    b = open(name, "rb").read()
+    n, = struct.unpack("<I", b[12:16])
+    return json.loads(b[20:20 + n]), b[28 + n:]
+def read(g, data, i):
+    a = dict(g["accessors"][i])
+    size = {5121: 1, 5123: 2, 5126: 4}[a["componentType"]]
+    width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[a["type"]]
+    def bytes_of(view, offset, n, element):
+        v = g["bufferViews"][view]
+        at, step = v.get("byteOffset", 0) + offset, v.get("byteStride", element)
+        return [data[at + k * step:][:element] for k in range(n)]
+    if "bufferView" in a: a["bufferView"] = bytes_of(a["bufferView"], a.pop("byteOffset", 0), a["count"], size * width)
+    if "sparse" in a:
+        n = a["sparse"]["count"]
+        a["sparse"] = [bytes_of(s["bufferView"], s.get("byteOffset", 0), n, e) for s, e in
+                       ((a["sparse"]["indices"], 2), (a["sparse"]["values"], size * width))]
+    return a
+def whole(name, animations=None):
+    g, data = load(name)
+    for m in g["meshes"]:
+        for p in m["primitives"]:
+            p["indices"] = read(g, data, p["indices"])
+            for some in p["attributes"], *p.get("targets", []):
+                for k in some: some[k] = read(g, data, some[k])
+    for k in g["skins"]: k["inverseBindMatrices"] = read(g, data, k["inverseBindMatrices"])
+    for image in g["images"]:
+        v = g["bufferViews"][image["bufferView"]]
+        image["bufferView"] = data[v["byteOffset"]:][:v["byteLength"]]
+    if animations is not None: g["animations"] = [a for a in g["animations"] if a["name"] in animations]
+    if not g.get("animations"): g.pop("animations", None)
+    for a in g.get("animations", []):
+        for s in a["samplers"]: s["input"], s["output"] = read(g, data, s["input"]), read(g, data, s["output"])
+    for key in "accessors", "bufferViews", "buffers": del g[key]
+    del g["asset"]["generator"]
+    return g
+if __name__ == "__main__":
+    if len(sys.argv) == 1: make()
+    else: assert whole(sys.argv[1]) == whole("in.glb", sys.argv[2:]), whole(sys.argv[1])
+END
+    PYTHONPATH="$ROOT/tests" python3 rich.py
+}
+kept() { PYTHONPATH="$ROOT/tests" must python3 rich.py "$@"; }
+is_mixed() { PYTHONPATH="$ROOT/tests" must python3 -c 'import rich, sys
+assert all(c["target"]["path"] == "weights" for a in rich.load(sys.argv[1])[0]["animations"] for c in a["channels"])' "$1"; }
+
+@test "what is not edited comes out as it was: skin, animations, shapes with tangents, default weights, sparse accessors" {
+    make_rich
+    must vg-encode in.glb -o all.vgs
+    must vg-decode all.vgs -o out.glb
+    kept out.glb Wave Nod Look
+    must vg-decode in.glb -o out.gltf
+    must vg-decode out.gltf -o out.glb
+    kept out.glb Wave Nod Look
+    pipe 'vg-encode --animation Wave in.glb | vg-decode -o out.glb'
+    kept out.glb Wave
+    pipe 'vg-encode --animation Nod in.glb | vg-decode --name Nod -o out.glb'
+    kept out.glb Nod
+    pipe 'vg-encode --animation Wave --fps 60 in.glb | vg-decode -o out.glb'
+    kept out.glb Wave
+    pipe 'vg-encode --fps 60 in.glb | vg-decode -o out.glb'
+    kept out.glb Wave Nod Look
+    pipe 'vg-encode --shapes in.glb | vg-decode -o out.glb'
+    kept out.glb
+    must_warn vg-decode -v in.glb -o out.glb
+    says "what moves is as it was in the GLB that was read"
+    # The pose at rest is what a player shows: shapes with their default weights.
+    must vg-decode --max-targets 1000 all.vgs -o mixed.glb
+    is_mixed mixed.glb
+    pipe 'vg-encode mixed.glb | vg-diff -t 1e-6 all.vgs -'
+    PYTHONPATH="$ROOT/tests" py <<'END'
+import rich, struct
+g, data = rich.load("in.glb")
+h, out = rich.load("mixed.glb")
+def points(g, data, i): return [struct.unpack("<3f", p) for p in rich.read(g, data, i)["bufferView"]]
+before, after = (points(d, b, d["meshes"][1]["primitives"][0]["attributes"]["POSITION"]) for d, b in ((g, data), (h, out)))
+for i, (p, q) in enumerate(zip(before, after)):
+    shown = [p[0] + 0.25 * {3: 1, 20: 0.5}.get(i, 0), p[1] + 0.5 * i / 24, p[2]]
+    assert max(abs(a - b) for a, b in zip(shown, q)) < 1e-6, (i, shown, q)
+assert not any(h["meshes"][1]["weights"])
+END
+}
+
+@test "shapes that are edited keep their default weights; an animation without a name keeps none until it is edited" {
+    make_rich
+    must vg-encode --shapes --scale 2 in.glb -o shapes.vgs
+    must vg-decode shapes.vgs -o out.glb
+    py <<'END'
+import json, struct
+b = open("in.glb", "rb").read()
+n, = struct.unpack("<I", b[12:16])
+g = json.loads(b[20:20 + n])
+g["animations"] = [{k: v for k, v in a.items() if k != "name"} for a in g["animations"][:1]]
+text = json.dumps(g).encode()
+text += bytes(b" " * (-len(text) % 4))
+whole = struct.pack("<I", len(text)) + b"JSON" + text + b[20 + n:]
+open("unnamed.glb", "wb").write(b"glTF" + struct.pack("<II", 2, 12 + len(whole)) + whole)
+END
+    pipe 'vg-encode unnamed.glb | vg-decode -o same.glb'
+    pipe 'vg-encode --scale 2 unnamed.glb | vg-decode -o edited.glb'
+    PYTHONPATH="$ROOT/tests" py <<'END'
+import rich
+meshes = rich.load("out.glb")[0]["meshes"]
+assert [m["weights"] for m in meshes] == [[0, 0], [0.25, 0.5]], meshes
+assert meshes[1]["extras"]["targetNames"] == ["wide", "tall"] and meshes[1]["extras"]["note"] == "kept"
+assert [a.get("name") for a in rich.load("same.glb")[0]["animations"]] == [None]
+assert [a.get("name") for a in rich.load("edited.glb")[0]["animations"]] == ["unnamed"]
+END
+}
+
+@test "what is edited, cut, renamed or asked for is written as morph targets" {
+    make_rich
+    must vg-encode --animation Wave in.glb -o wave.vgs
+    local cut
+    for cut in 0,1 1,2 0-/2; do
+        pipe "vg-encode --animation Wave --take $cut in.glb | vg-decode -o out.glb"
+        is_mixed out.glb
+    done
+    for how in '--quantize' '--morph-tolerance 1e-6' '--max-targets 9' '--fps 9'; do
+        # shellcheck disable=SC2086 # options
+        must vg-decode -q $how wave.vgs -o out.glb
+        is_mixed out.glb
+    done
+    pipe 'vg-encode in.glb | vg-decode -q --name Both -o out.glb'
+    is_mixed out.glb
+    pipe 'vg-encode --scale 1.00001 --animation Wave in.glb | vg-decode -o out.glb'
+    is_mixed out.glb
+}
+
 # A skinned mesh below a moved node, and the other one with joints but without a skin: the validator warns of both.
 @test "what others warn of is mended: a skinned mesh below a node, joints without a skin; nothing unused stays" {
     py <<'END'

@@ -1,6 +1,6 @@
 /* gltf_asset.c: the contents of a glTF file besides shape and motion, as a GLB of the character at rest: materials,
- * textures, images, attributes of vertices, skins, nodes, cameras, lights. Animations, morph targets and unreferenced
- * items are dropped. The stream carries the asset unchanged (record ASST). It is written again in gltf_character.c.
+ * textures, images, attributes of vertices, skins, nodes, cameras, lights, animations, morph targets. Unreferenced items
+ * are dropped. The stream carries the asset unchanged (record ASST). It is written again in gltf_character.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_pack.h"
 #include "io/gltf_scene.h"
@@ -33,28 +33,54 @@ static int add_view(packing *k, size_t start, int target, size_t stride, size_t 
     return r;
 }
 
-/* Write the elements contiguously; those of vertices start at multiples of 4. */
+/* Write the elements before sparse ones replace them contiguously; those of vertices start at multiples of 4. */
 static int put_elements(packing *k, const vgi_accessor *a, bool vertices, size_t *stride, vg_err *e)
 {
     static const unsigned char zeros[64];
     const size_t element = vgi_accessor_bytes(a), step = vertices ? (element + 3) / 4 * 4 : element;
-    int r = align_bytes(k, e);
-    if (r == VG_OK) r = vgi_bytes_reserve(&k->data, k->data.size + a->count * step, e);
+    int r = vgi_bytes_reserve(&k->data, k->data.size + a->count * step, e);
     for (size_t i = 0; i < a->count && r == VG_OK; i++) {
-        const unsigned char *p = vgi_accessor_at(a, i);
-        r = vgi_bytes_append(&k->data, p ? p : zeros, element, e);
+        r = vgi_bytes_append(&k->data, a->data + i * a->stride, element, e);
         if (r == VG_OK) r = vgi_bytes_append(&k->data, zeros, step - element, e);
     }
     *stride = vertices ? step : 0;
     return r;
 }
 
-static int add_accessor(packing *k, const vgi_json *old, size_t view, vg_err *e)
+/* n bytes as a view of their own, as the part `key` of a sparse accessor. */
+static int put_part(packing *k, vgi_json *sparse, const char *key, const unsigned char *p, size_t n, vg_err *e)
 {
+    vgi_json *part = vgi_json_inner(sparse, key);
+    size_t view = 0;
+    int r = align_bytes(k, e);
+    const size_t start = k->data.size;
+    if (r == VG_OK) r = vgi_bytes_append(&k->data, p, n, e);
+    if (r == VG_OK) r = add_view(k, start, NO_TARGET, 0, &view, e);
+    vgi_json_drop(part, "byteOffset");
+    return r < 0 ? r : vgi_json_put(part, "bufferView", vgi_json_of_whole(view, e), e);
+}
+
+static int put_sparse(packing *k, vgi_json *accessor, const vgi_accessor *a, vg_err *e)
+{
+    vgi_json *sparse = vgi_json_inner(accessor, "sparse");
+    int r = put_part(k, sparse, "indices", a->sparse, a->nsparse * vgi_gltf_component_bytes(a->sparse_component), e);
+    return r < 0 ? r : put_part(k, sparse, "values", a->replaced, a->nsparse * vgi_accessor_bytes(a), e);
+}
+
+static int add_accessor(packing *k, const vgi_json *old, const vgi_accessor *a, int target, vg_err *e)
+{
+    static const char *const gone[] = {"bufferView", "byteOffset", "extensions", "extras"};
     vgi_json *copy = vgi_json_copy(old, e);
-    static const char *const gone[] = {"byteOffset", "sparse", "extensions", "extras"};
+    size_t stride, view = 0;
     for (size_t i = 0; copy && i < sizeof gone / sizeof *gone; i++) vgi_json_drop(copy, gone[i]);
+    if (copy && !a->nsparse) vgi_json_drop(copy, "sparse");
     int r = vgi_json_add(k->accessors, copy, e);
+    if (r == VG_OK && a->nsparse) r = put_sparse(k, copy, a, e);
+    if (r < 0 || !a->data) return r;
+    r = align_bytes(k, e);
+    const size_t start = k->data.size;
+    if (r == VG_OK) r = put_elements(k, a, target == ARRAY_BUFFER, &stride, e);
+    if (r == VG_OK) r = add_view(k, start, target, stride, &view, e);
     return r < 0 ? r : vgi_json_put(copy, "bufferView", vgi_json_of_whole(view, e), e);
 }
 
@@ -63,16 +89,13 @@ static int add_accessor(packing *k, const vgi_json *old, size_t view, vg_err *e)
 static int move_accessor(packing *k, vgi_json *holder, const char *key, int target, size_t count, vg_err *e)
 {
     const vgi_json *ref = vgi_json_get(holder, key), *old;
-    size_t number, view, stride;
+    size_t number;
     vgi_accessor a;
     if (vgi_gltf_item(k->g, ref, "accessors", &old, &number, NULL) < 0 ||
         vgi_gltf_any_accessor(k->g, ref, &a, NULL) < 0 || (count && a.count != count))
         return 0;
     if (!k->accessor_of[number]) {
-        const size_t start = (k->data.size + ALIGNED - 1) / ALIGNED * ALIGNED;
-        int r = put_elements(k, &a, target == ARRAY_BUFFER, &stride, e);
-        if (r == VG_OK) r = add_view(k, start, target, stride, &view, e);
-        if (r == VG_OK) r = add_accessor(k, old, view, e);
+        int r = add_accessor(k, old, &a, target, e);
         if (r < 0) return r;
         k->accessor_of[number] = vgi_json_count(k->accessors);
     }
@@ -145,8 +168,7 @@ static int move_image(packing *k, vgi_json *image, vg_err *e)
 
 static bool is_carried(const char *extension)
 {
-    return vgi_gltf_is_understood(extension) && strncmp(extension, "KHR_audio_", 10) &&
-           strcmp(extension, "KHR_animation_pointer");
+    return vgi_gltf_is_understood(extension) && strncmp(extension, "KHR_audio_", 10);
 }
 
 static void drop_unknown(vgi_json *extensions)
@@ -182,20 +204,15 @@ static int filter_list(vgi_json *doc, const char *key, vg_err *e)
     return r;
 }
 
-static void drop_target_names(vgi_json *holder)
-{
-    vgi_json_drop(vgi_json_inner(holder, "extras"), "targetNames");
-    vgi_json_drop(holder, "weights");
-    vgi_json_drop(holder, "targets");
-}
-
 static int move_primitive(packing *k, vgi_json *primitive, vg_err *e)
 {
     vgi_json *attributes = vgi_json_inner(primitive, "attributes");
     vgi_accessor position = {0};
-    drop_target_names(primitive);
     if (vgi_gltf_any_accessor(k->g, vgi_json_get(attributes, "POSITION"), &position, NULL) < 0) position.count = 0;
     int r = move_accessors(k, attributes, ARRAY_BUFFER, position.count, e);
+    vgi_json *targets = vgi_json_inner(primitive, "targets");
+    for (size_t t = 0; t < vgi_json_count(targets) && r == VG_OK; t++)
+        r = move_accessors(k, vgi_json_inner_at(targets, t), ARRAY_BUFFER, position.count, e);
     if (r == VG_OK && vgi_json_get(primitive, "indices")) r = move_accessor(k, primitive, "indices", ELEMENT_BUFFER, 0, e);
     return r < 0 ? r : VG_OK;
 }
@@ -204,7 +221,6 @@ static int move_mesh(packing *k, vgi_json *mesh, vg_err *e)
 {
     vgi_json *primitives = vgi_json_inner(mesh, "primitives");
     int r = VG_OK;
-    drop_target_names(mesh);
     for (size_t i = 0; i < vgi_json_count(primitives) && r == VG_OK; i++)
         r = move_primitive(k, vgi_json_inner_at(primitives, i), e);
     return r;
@@ -213,7 +229,6 @@ static int move_mesh(packing *k, vgi_json *mesh, vg_err *e)
 static int move_node(packing *k, vgi_json *node, vg_err *e)
 {
     vgi_json *instances = vgi_json_inner(vgi_json_inner(node, "extensions"), "EXT_mesh_gpu_instancing");
-    vgi_json_drop(node, "weights");
     return move_accessors(k, vgi_json_inner(instances, "attributes"), NO_TARGET, 0, e);
 }
 
@@ -221,6 +236,36 @@ static int move_skin(packing *k, vgi_json *skin, vg_err *e)
 {
     static const char key[] = "inverseBindMatrices";
     int r = vgi_json_get(skin, key) ? move_accessor(k, skin, key, NO_TARGET, 0, e) : VG_OK;
+    return r < 0 ? r : VG_OK;
+}
+
+/* 0: the animation cannot be copied. */
+static int move_samplers(packing *k, vgi_json *animation, vg_err *e)
+{
+    vgi_json *samplers = vgi_json_inner(animation, "samplers");
+    int r = 1;
+    for (size_t i = 0; i < vgi_json_count(samplers) && r == 1; i++) {
+        r = move_accessor(k, vgi_json_inner_at(samplers, i), "input", NO_TARGET, 0, e);
+        if (r == 1) r = move_accessor(k, vgi_json_inner_at(samplers, i), "output", NO_TARGET, 0, e);
+    }
+    return r;
+}
+
+static int move_animations(packing *k, vg_err *e)
+{
+    static const char key[] = "animations";
+    const vgi_json *old = vgi_json_get(k->doc, key);
+    vgi_json *list = vgi_json_array(e);
+    int r = list ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < vgi_json_count(old) && r >= 0; i++) {
+        vgi_json *copy = vgi_json_copy(vgi_json_at(old, i), e);
+        r = copy ? move_samplers(k, copy, e) : VG_ENOMEM;
+        if (r == 1) r = vgi_json_add(list, copy, e);
+        else vgi_json_free(&copy);
+    }
+    if (r >= 0 && vgi_json_count(list)) return vgi_json_put(k->doc, key, list, e);
+    vgi_json_free(&list);
+    vgi_json_drop(k->doc, key);
     return r < 0 ? r : VG_OK;
 }
 
@@ -234,7 +279,7 @@ static int for_each(packing *k, const char *list, int (*move)(packing *, vgi_jso
 
 static int move_all(packing *k, vg_err *e)
 {
-    static const char *const gone[] = {"animations", "buffers", "accessors", "bufferViews"};
+    static const char *const gone[] = {"buffers", "accessors", "bufferViews"};
     for (size_t i = 0; i < sizeof gone / sizeof *gone; i++) vgi_json_drop(k->doc, gone[i]);
     strip_extensions(k->doc);
     int r = filter_list(k->doc, "extensionsUsed", e);
@@ -243,6 +288,7 @@ static int move_all(packing *k, vg_err *e)
     if (r == VG_OK) r = for_each(k, "meshes", move_mesh, e);
     if (r == VG_OK) r = for_each(k, "nodes", move_node, e);
     if (r == VG_OK) r = for_each(k, "skins", move_skin, e);
+    if (r == VG_OK) r = move_animations(k, e);
     return r < 0 ? r : for_each(k, "images", move_image, e);
 }
 
@@ -322,6 +368,7 @@ static bool has_more(const vgi_gltf_scene *x, const vg_mesh *mesh)
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
         if (vgi_json_count(vgi_json_get(doc, lists[i]))) return true;
     const bool plain = x->own && x->nparts == 1; /* its normals were computed by the writer */
+    if (!x->own && (x->most_targets || vgi_json_count(vgi_json_get(doc, "animations")))) return true;
     if (x->nnodes > 1 || (!x->own && (mesh->nv != x->all || has_names(x)))) return true;
     for (size_t i = 0; i < x->nparts; i++)
         for (const char *key = vgi_json_key(x->parts[i].attributes, NULL); key;

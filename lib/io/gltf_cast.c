@@ -39,9 +39,10 @@ int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_json *asset = vgi_json_copy(vgi_json_get(w->character->scene.g.json, "asset"), e);
     int r = asset ? vgi_json_put(asset, "generator", vgi_json_of_text("vg " VG_VERSION, e), e) : VG_ENOMEM;
-    if (r == VG_OK) vgi_json_drop(vgi_json_inner(asset, "extras"), VGI_GLTF_VERTICES);
-    if (r == VG_OK && w->character->touches) r = ensure_extras(asset, e);
-    if (r == VG_OK && w->character->touches) r = list_vertices(w->character, vgi_json_inner(asset, "extras"), e);
+    const bool lists = w->character->touches && !w->whole; /* its own file says which vertices are one */
+    if (r == VG_OK && !w->whole) vgi_json_drop(vgi_json_inner(asset, "extras"), VGI_GLTF_VERTICES);
+    if (r == VG_OK && lists) r = ensure_extras(asset, e);
+    if (r == VG_OK && lists) r = list_vertices(w->character, vgi_json_inner(asset, "extras"), e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "{\"asset\":");
     if (r == VG_OK) r = vgi_json_print(asset, &w->json, e);
     vgi_json_free(&asset);
@@ -59,12 +60,12 @@ static void drop_influences(vgi_json *attributes)
     }
 }
 
-static void trim_primitives(vgi_json *mesh, bool skinned)
+static void trim_primitives(vgi_json *mesh, bool targets, bool skinned)
 {
     vgi_json *primitives = vgi_json_inner(mesh, "primitives");
     for (size_t i = 0; i < vgi_json_count(primitives); i++) {
         vgi_json *primitive = vgi_json_inner_at(primitives, i);
-        vgi_json_drop(primitive, "targets");
+        if (!targets) vgi_json_drop(primitive, "targets");
         if (!skinned) drop_influences(vgi_json_inner(primitive, "attributes"));
     }
 }
@@ -94,7 +95,7 @@ static void find_uses(const vgi_gltf_scene *x, uses *u)
     for (size_t s = 0; s < x->nskins; s++) u->bound[s] = vgi_gltf_users_of(x->g.json, s) == 1;
 }
 
-int vgi_gltf_trim_cast(vgi_gltf_writing *w, bool quantized, vg_err *e)
+static int trim(vgi_gltf_writing *w, bool quantized, vg_err *e)
 {
     vgi_gltf_scene *x = &w->character->scene;
     vgi_json *meshes = vgi_json_inner(x->g.json, "meshes");
@@ -102,15 +103,30 @@ int vgi_gltf_trim_cast(vgi_gltf_writing *w, bool quantized, vg_err *e)
     uses u = {vgi_array(n, 1, e), vgi_array(n, 1, e), vgi_array(x->nskins, 1, e)};
     int r = u.meshes && u.skinned && u.bound ? VG_OK : VG_ENOMEM;
     if (r == VG_OK) find_uses(x, &u);
-    for (size_t i = 0; i < x->nparts; i++) x->parts[i].targets = NULL;
-    for (size_t m = 0; m < n && r == VG_OK; m++) trim_primitives(vgi_json_inner_at(meshes, m), u.skinned[m]);
-    vgi_json_drop(x->g.json, "animations");
-    const vgi_gltf_pruned pruned = {u.meshes, quantized ? u.bound : NULL, quantized || !w->character->kept};
+    for (size_t m = 0; m < n && r == VG_OK; m++)
+        if (u.meshes[m]) trim_primitives(vgi_json_inner_at(meshes, m), w->whole, u.skinned[m]);
+    const vgi_gltf_pruned pruned = {w->whole ? NULL : u.meshes, quantized ? u.bound : NULL,
+                                    !w->whole && (quantized || !w->character->kept)};
     if (r == VG_OK) r = vgi_gltf_prune(&x->g, &pruned, &w->asset, e);
     free(u.meshes);
     free(u.skinned);
     free(u.bound);
     return r;
+}
+
+int vgi_gltf_trim_cast(vgi_gltf_writing *w, bool quantized, vg_err *e)
+{
+    vgi_gltf_scene *x = &w->character->scene;
+    for (size_t i = 0; i < x->nparts; i++) x->parts[i].targets = NULL;
+    vgi_json_drop(x->g.json, "animations");
+    return trim(w, quantized, e);
+}
+
+int vgi_gltf_trim_whole(vgi_gltf_writing *w, vg_err *e)
+{
+    int r = vgi_gltf_whole_trim(w->whole, w->clip, e);
+    if (r == VG_OK) r = vgi_gltf_raise_skins(&w->character->scene, w->character->scene.g.json, e);
+    return r < 0 ? r : trim(w, false, e);
 }
 
 /* ---- meshes ---- */
@@ -143,17 +159,31 @@ static int add_primitive(vgi_json *primitives, const vgi_gltf_scene *x, const vg
     int r = vgi_json_add(primitives, primitive, e);
     if (r < 0) return r;
     vgi_json *attributes = vgi_json_inner(primitive, "attributes");
+    vgi_json_drop(vgi_json_inner(primitive, "extras"), "targetNames");
     if (x->parts[piece->part].skin == VGI_GLTF_NONE) drop_influences(attributes);
     r = put_number(attributes, "POSITION", l->position, e);
     if (r == VG_OK && l->normals) r = put_number(attributes, "NORMAL", l->normal, e);
     return r < 0 ? r : add_targets(primitive, k, piece->part, e);
 }
 
-static int add_weights(vgi_json *mesh, size_t n, vg_err *e)
+/* The weight that a node's shape of this name has without animation; 0 if there is none. */
+static double weight_of(const vgi_gltf_scene *x, size_t node, const char *name)
+{
+    const vgi_gltf_node *n = &x->nodes[node];
+    for (size_t t = 0; t < n->nweights; t++)
+        if (!strcmp(vgi_gltf_shape_name(x, n->shape_of[t]), name)) return n->rest_weights[t];
+    return 0;
+}
+
+static int add_weights(vgi_json *mesh, const vgi_gltf_scene *x, size_t node, const vgi_gltf_cast *k, vg_err *e)
 {
     vgi_json *weights = vgi_json_array(e);
     int r = vgi_json_put(mesh, "weights", weights, e);
-    for (size_t t = 0; t < n && r == VG_OK; t++) r = vgi_json_add(weights, vgi_json_of_whole(0, e), e);
+    for (size_t t = 0; t < k->targets && r == VG_OK; t++) {
+        const char *name = vgi_json_text(vgi_json_at(k->names, t));
+        const double weight = k->shapes && name ? weight_of(x, node, name) : 0;
+        r = vgi_json_add(weights, weight == 0 ? vgi_json_of_whole(0, e) : vgi_json_of_number(weight, e), e);
+    }
     return r;
 }
 
@@ -173,7 +203,9 @@ static int add_mesh(vgi_json *meshes, const vgi_gltf_scene *x, size_t node, cons
     if (r == VG_OK) r = vgi_json_put(mesh, "primitives", primitives = vgi_json_array(e), e);
     for (size_t i = 0; i < x->npieces && r == VG_OK; i++)
         if (x->parts[x->pieces[i].part].node == node) r = add_primitive(primitives, x, &x->pieces[i], k, e);
-    if (r == VG_OK && k->targets) r = add_weights(mesh, k->targets, e);
+    vgi_json_drop(mesh, "weights");
+    vgi_json_drop(vgi_json_inner(mesh, "extras"), "targetNames");
+    if (r == VG_OK && k->targets) r = add_weights(mesh, x, node, k, e);
     return r == VG_OK && k->targets ? add_names(mesh, k->names, e) : r;
 }
 
@@ -195,6 +227,7 @@ static int cast_nodes(vgi_json *doc, const vgi_gltf_scene *x, const vgi_gltf_cas
     for (size_t i = 0; i < x->nnodes && r == VG_OK; i++) {
         vgi_json *node = vgi_json_inner_at(nodes, i);
         drop_instancing(node);
+        vgi_json_drop(node, "weights");
         if (!shows_mesh(x, i, &mesh)) {
             vgi_json_drop(node, "mesh");
             vgi_json_drop(node, "skin");
@@ -234,15 +267,29 @@ static int say_members(vgi_gltf_writing *w, const vgi_json *doc, vg_err *e)
     return r;
 }
 
-int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e)
+/* Members that the writer makes. */
+static void drop_made(vgi_json *doc)
 {
     static const char *const made[] = {"asset", "accessors", "bufferViews", "buffers"};
-    static const char instancing[] = "EXT_mesh_gpu_instancing";
+    for (size_t i = 0; i < sizeof made / sizeof *made; i++) vgi_json_drop(doc, made[i]);
+}
+
+int vgi_gltf_say_whole(vgi_gltf_writing *w, vg_err *e)
+{
+    drop_made(w->character->scene.g.json);
+    return say_members(w, w->character->scene.g.json, e);
+}
+
+int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e)
+{
+    static const char instancing[] = "EXT_mesh_gpu_instancing", pointers[] = "KHR_animation_pointer";
     vgi_json *doc = vgi_json_copy(w->character->scene.g.json, e);
-    int r = doc ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; doc && i < sizeof made / sizeof *made; i++) vgi_json_drop(doc, made[i]);
+    int r = doc ? vgi_gltf_list_shapes(&w->character->scene, e) : VG_ENOMEM;
+    if (doc) drop_made(doc);
     if (r == VG_OK) r = drop_from_list(doc, "extensionsUsed", instancing, e);
     if (r == VG_OK) r = drop_from_list(doc, "extensionsRequired", instancing, e);
+    if (r == VG_OK) r = drop_from_list(doc, "extensionsUsed", pointers, e);
+    if (r == VG_OK) r = drop_from_list(doc, "extensionsRequired", pointers, e);
     if (r == VG_OK) r = cast_nodes(doc, &w->character->scene, k, e);
     if (r == VG_OK) r = vgi_gltf_raise_skins(&w->character->scene, doc, e);
     if (r == VG_OK && k->ngrids) r = vgi_gltf_put_grids(doc, k->grids, k->ngrids, e);

@@ -198,7 +198,7 @@ static int add_keys(vgi_gltf_scene *x, size_t first, vg_err *e)
     return r;
 }
 
-static int read_animation(vgi_gltf_scene *x, const vgi_json *animation, vg_err *e)
+static int read_animation(vgi_gltf_scene *x, const vgi_json *animation, size_t number, vg_err *e)
 {
     const vgi_json *channels = vgi_json_get(animation, "channels");
     const size_t first = x->nchannels, moments = x->nmoments;
@@ -211,7 +211,7 @@ static int read_animation(vgi_gltf_scene *x, const vgi_json *animation, vg_err *
     if (r < 0) return r;
     const vgi_json *names = vgi_json_get(vgi_json_get(animation, "extras"), VGI_GLTF_FRAMES);
     const char *name = vgi_json_text(vgi_json_get(animation, "name"));
-    x->clips[x->nclips++] = (vgi_gltf_clip){first, x->nchannels - first, moments, name && *name ? name : NULL,
+    x->clips[x->nclips++] = (vgi_gltf_clip){first, x->nchannels - first, moments, number, name && *name ? name : NULL,
                                    vgi_json_count(names) == x->nmoments - moments ? names : NULL};
     return VG_OK;
 }
@@ -236,7 +236,7 @@ int vgi_gltf_read_animations(vgi_gltf_scene *x, vg_err *e)
     for (size_t i = 0; i < vgi_json_count(list) && r == VG_OK; i++) {
         const vgi_json *animation = vgi_json_at(list, i);
         const char *name = vgi_json_text(vgi_json_get(animation, "name"));
-        if (!x->wanted || (name && !strcmp(name, x->wanted))) r = read_animation(x, animation, e);
+        if (!x->wanted || (name && !strcmp(name, x->wanted))) r = read_animation(x, animation, i, e);
     }
     return r == VG_OK && x->wanted && !x->nclips ? no_such_animation(x, list, e) : r;
 }

@@ -340,7 +340,7 @@ static int say_cast(vgi_gltf_writing *w, vg_err *e)
     const vgi_gltf_morphs *x = w->own;
     vgi_json *names = NULL;
     int r = name_targets(w, &names, e);
-    const vgi_gltf_cast cast = {x->lists, x->targets, target_of, x, names, x->grids, x->ngrids};
+    const vgi_gltf_cast cast = {x->lists, x->targets, target_of, x, names, w->still, x->grids, x->ngrids};
     if (r == VG_OK) r = vgi_gltf_say_cast(w, &cast, e);
     vgi_json_free(&names);
     return r;
@@ -370,6 +370,7 @@ static int say_scene(vgi_gltf_writing *w, vg_err *e)
 static int describe_morphs(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_morphs *x = w->own;
+    if (w->whole) return vgi_gltf_say_whole(w, e);
     int r = choose_targets(w, e);
     if (r == VG_OK) r = list_vertices(w, e);
     if (r == VG_OK) r = turn_basis(w, e);
@@ -399,6 +400,7 @@ static int emit_weights(vgi_gltf_writing *w, vg_err *e)
 
 static int emit_morphs(vgi_gltf_writing *w, vg_err *e)
 {
+    if (w->whole) return VG_OK;
     int r = w->still ? VG_OK : emit_weights(w, e);
     return r < 0 ? r : vgi_gltf_emit_targets(w, e);
 }
@@ -407,7 +409,7 @@ static void warning(const vgi_gltf_writing *w, char *to, size_t room)
 {
     const vgi_gltf_morphs *x = w->own;
     const double d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
-    if (!x->chosen && x->basis.error > x->tolerance * d)
+    if (!w->whole && !x->chosen && x->basis.error > x->tolerance * d)
         snprintf(to, room,
                  "every frame: %zu are mixed from %zu morph targets, with vertices off by at "
                  "most %.3g%% of the diagonal (--max-targets)",
@@ -419,6 +421,10 @@ static bool report(const vgi_gltf_writing *w, char *to, size_t room)
 {
     const vgi_gltf_morphs *x = w->own;
     const double d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
+    if (w->whole) {
+        snprintf(to, room, "what moves is as it was in the GLB that was read");
+        return false;
+    }
     int n = w->still && !x->targets ? snprintf(to, room, "no morph targets")
                                     : snprintf(to, room, "%zu morph target%s for %zu frame%s", x->targets,
                                                x->targets == 1 ? "" : "s", w->frames, w->frames == 1 ? "" : "s");

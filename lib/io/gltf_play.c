@@ -165,13 +165,32 @@ static int begin_moment(vgi_gltf_scene *x, size_t i, vg_frame *f, vg_err *e)
 }
 
 /* Shape i - 1 alone, in all meshes that have it; 0: none. */
-static int begin_shape(vgi_gltf_scene *x, size_t i, vg_frame *f, vg_err *e)
+static void set_shape(vgi_gltf_scene *x, size_t i)
 {
-    const char *name = i ? vgi_gltf_shape_name(x, i - 1) : x->frames > 1 ? VGI_GLTF_BASE : "";
     for (size_t n = 0; n < x->nnodes; n++)
         for (size_t t = 0; i > 0 && t < x->nodes[n].nweights; t++)
             if (x->nodes[n].shape_of[t] == i - 1) x->nodes[n].weights[t] = 1;
+}
+
+static int begin_shape(vgi_gltf_scene *x, size_t i, vg_frame *f, vg_err *e)
+{
+    const char *name = i ? vgi_gltf_shape_name(x, i - 1) : x->frames > 1 ? VGI_GLTF_BASE : "";
+    set_shape(x, i);
     return *name ? vg_frame_rename(f, name, e) : VG_OK;
+}
+
+int vgi_gltf_pose_at(vgi_gltf_scene *x, const vgi_gltf_moment *m, double *to, vg_err *e)
+{
+    reset_nodes(x, true);
+    int r = m ? vgi_gltf_animate(x, m, e) : VG_OK;
+    return r < 0 ? r : pose_vertices(x, to, e);
+}
+
+int vgi_gltf_pose_shape(vgi_gltf_scene *x, size_t shape, double *to, vg_err *e)
+{
+    reset_nodes(x, false);
+    set_shape(x, shape);
+    return pose_vertices(x, to, e);
 }
 
 int vgi_gltf_next(void *state, vg_frame *f, vg_err *e)
@@ -200,8 +219,7 @@ static int take_reference(vgi_gltf_scene *x, vg_head *h, vg_err *e)
     const char *name = vgi_json_text(vgi_json_get(mesh, "name"));
     if (name && *name && !(h->body.reference_name = vgi_copy_string(name, strlen(name), e))) return VG_ENOMEM;
     if (!(h->body.reference = vgi_array(h->body.mesh.nv, 3 * sizeof *h->body.reference, e))) return VG_ENOMEM;
-    reset_nodes(x, false);
-    return pose_vertices(x, h->body.reference, e);
+    return x->nclips ? vgi_gltf_pose_at(x, NULL, h->body.reference, e) : vgi_gltf_pose_shape(x, 0, h->body.reference, e);
 }
 
 static int set_up(vgi_gltf_scene *x, const vg_reading *how, vg_err *e)

@@ -73,6 +73,7 @@ typedef struct vgi_gltf_channel {
 
 typedef struct vgi_gltf_clip {
     size_t first, nchannels, frames; /* frames: its first moment */
+    size_t animation;      /* its number in the file */
     const char *name;      /* or NULL */
     const vgi_json *names; /* of its frames; or NULL */
 } vgi_gltf_clip;
@@ -140,6 +141,10 @@ void vgi_gltf_from_columns(const double c[16], double m[12]); /* the upper rows 
 /* ---- gltf_play.c ---- */
 /* vgi_gltf_rest: reset nodes and joints to the file's values, without morph targets. */
 void vgi_gltf_rest(vgi_gltf_scene *x);
+/* vgi_gltf_pose_at, vgi_gltf_pose_shape: positions of all kept vertices: at a moment (NULL: at rest, with the morph weights of
+ * the file), or with one shape alone (0: none, else its number + 1). */
+int vgi_gltf_pose_at(vgi_gltf_scene *x, const vgi_gltf_moment *m, double *to, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_pose_shape(vgi_gltf_scene *x, size_t shape, double *to, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_move_point(const double m[12], const double p[3], double to[3]); /* to = m p; `to` must not be p */
 /* vgi_gltf_vertex_matrix: the matrix from vertex v of a part to the world, for the current nodes and joints. */
 void vgi_gltf_vertex_matrix(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, double m[12]);

@@ -72,6 +72,30 @@ static int open_character(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
+/* Where nothing asks for morph targets, the animations of the character's own file are kept if they show the frames. */
+static int open_whole(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
+{
+    if (!w->character || o->quantize || o->most_targets || o->morph_tolerance > 0) return VG_OK;
+    if (!(w->whole = vgi_array(1, sizeof *w->whole, e))) return VG_ENOMEM;
+    return vgi_gltf_whole_open(w->whole, w->character, &w->h->body, e);
+}
+
+static void close_whole(vgi_gltf_writing *w)
+{
+    if (w->whole) vgi_gltf_whole_clear(w->whole);
+    free(w->whole);
+    w->whole = NULL;
+}
+
+/* Keep it if the frames are all of it. shapes: no animation is wanted. */
+static void decide_whole(vgi_gltf_writing *w)
+{
+    const bool fits = w->whole && vgi_gltf_whole_end(w->whole);
+    const bool moves = fits && w->whole->content == VGI_GLTF_CLIPS;
+    if (!fits || (moves && (w->shapes || (w->clip && vgi_gltf_whole_clips(w->whole) > 1)))) close_whole(w);
+    if (w->whole) w->still = true, w->times_lost = false;
+}
+
 /* The vertices of the file, and their normals; a character has its own. */
 static int cut_mesh(vgi_gltf_writing *w, bool normals, vg_err *e)
 {
@@ -93,7 +117,9 @@ int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi
     w->out = out, w->h = h, w->binary = binary, w->clip = o->name, w->quantized = o->quantize;
     w->spool.name = "temporary file";
     if ((w->spool.fd = vgi_nameless_file(e)) < 0) return w->spool.fd;
+    w->shapes = o->shapes;
     int r = h->kind == VG_VERTICES ? open_character(w, e) : VG_OK;
+    if (r == VG_OK) r = open_whole(w, o, e);
     if (r == VG_OK) r = cut_mesh(w, !o->no_normals, e);
     if (r == VG_OK) r = round_base(w, e);
     return r < 0 ? r : w->manner->begin(w, o, e);
@@ -103,6 +129,7 @@ int vgi_gltf_put(void *state, const vg_frame *f, vg_err *e)
 {
     vgi_gltf_writing *w = state;
     int r = w->manner->put(w, f, e);
+    if (r == VG_OK && w->whole) r = vgi_gltf_whole_put(w->whole, f, e);
     if (r == VG_OK) r = vgi_names_add(&w->names, f->name ? f->name : "", f->name ? strlen(f->name) : 0, e);
     if (r == VG_OK) r = vgi_grow(&w->times, &w->times_cap, w->frames + 1, sizeof *w->times, e);
     if (r < 0) return r;
@@ -298,7 +325,7 @@ static int emit_colours(vgi_gltf_writing *w, vg_err *e)
 static int describe_character(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_character *c = w->character;
-    int r = vgi_gltf_trim_cast(w, w->quantized, e);
+    int r = w->whole ? vgi_gltf_trim_whole(w, e) : vgi_gltf_trim_cast(w, w->quantized, e);
     if (r == VG_OK) r = vgi_gltf_say_elements(c->scene.g.json, "bufferViews", &w->views, &w->nviews, e);
     w->bytes = w->asset.size;
     return r < 0 ? r : vgi_gltf_say_elements(c->scene.g.json, "accessors", &w->accessors, &w->naccessors, e);
@@ -511,6 +538,7 @@ int vgi_gltf_end(void *state, vg_err *e)
     vgi_gltf_writing *w = state;
     int r = vgi_output_flush(&w->spool, e);
     if (r == VG_OK) r = vgi_gltf_find_takes(w, w->manner->splits, e);
+    if (r == VG_OK) decide_whole(w);
     if (r == VG_OK && !w->character) r = make_shape(w, e);
     if (r == VG_OK && !w->character) r = vgi_gltf_find_materials(w, e);
     if (r == VG_OK) r = say_all(w, e);
@@ -539,6 +567,7 @@ void vgi_gltf_release(void *state)
     w->manner->release(w->own);
     vgi_gltf_clear(&w->library);
     vgi_name_set_clear(&w->materials);
+    close_whole(w);
     if (w->character) vgi_gltf_character_clear(w->character);
     free(w->character);
     if (w->spool.fd >= 0) close(w->spool.fd);

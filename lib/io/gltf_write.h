@@ -9,6 +9,7 @@
 #include "io/gltf_normals.h"
 #include "io/gltf_quantize.h"
 #include "io/gltf_seams.h"
+#include "io/gltf_whole.h"
 
 enum { VGI_GLTF_ITEM = 4, VGI_GLTF_POINT = 12 }; /* bytes of a number, and of three */
 
@@ -65,7 +66,8 @@ struct vgi_gltf_writing {
     vgi_output *out, spool;    /* spool: stored frames, in an unnamed file */
     const vg_head *h;
     bool binary;
-    bool still;                /* shapes without an animation */
+    bool shapes;               /* no animation is wanted */
+    bool still;                /* none is written */
     const char *clip;          /* name of the animation; NULL: from the frames */
     size_t frames;
     vgi_names names;
@@ -76,6 +78,7 @@ struct vgi_gltf_writing {
     bool times_lost;
     vgi_gltf_character *character; /* its nodes, materials and attributes are written; NULL: none */
     bool quantized;
+    vgi_gltf_whole *whole;     /* the character's own animations or shapes, as long as they may be those of the frames; or NULL */
     vg_bytes asset;            /* what of its bytes is written */
     vgi_gltf library;          /* of materials, without meshes; json NULL: none */
     vgi_name_set materials;    /* names of those written */
@@ -117,11 +120,15 @@ typedef struct vgi_gltf_cast {
     size_t (*target)(const void *context, size_t t, size_t l);
     const void *context;
     const vgi_json *names;
+    bool shapes;        /* targets are shapes, with the default weights of those that the file has */
     const vgi_gltf_grid *grids;
     size_t ngrids;
 } vgi_gltf_cast;
 /* vgi_gltf_trim_cast: drop what is not written again from the document of the character, and gather the bytes of the rest. */
 int vgi_gltf_trim_cast(vgi_gltf_writing *w, bool quantized, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_trim_whole, vgi_gltf_say_whole: the same for a file with animations and targets of its own. */
+int vgi_gltf_trim_whole(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_say_whole(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_say_elements: write the elements of a list of a file as text. */
 int vgi_gltf_say_elements(const vgi_json *document, const char *list, vg_bytes *to, size_t *n,
