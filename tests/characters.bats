@@ -175,10 +175,6 @@ assert all(c["target"]["path"] == "weights" for a in rich.load(sys.argv[1])[0]["
     kept out.glb Wave
     pipe 'vg-encode --animation Nod in.glb | vg-decode --name Nod -o out.glb'
     kept out.glb Nod
-    pipe 'vg-encode --animation Wave --fps 60 in.glb | vg-decode -o out.glb'
-    kept out.glb Wave
-    pipe 'vg-encode --fps 60 in.glb | vg-decode -o out.glb'
-    kept out.glb Wave Nod Look
     pipe 'vg-encode --shapes in.glb | vg-decode -o out.glb'
     kept out.glb
     must_warn vg-decode -v in.glb -o out.glb
@@ -240,6 +236,10 @@ END
         must vg-decode -q $how wave.vgs -o out.glb
         is_mixed out.glb
     done
+    pipe 'vg-encode --fps 60 in.glb | vg-decode -o out.glb'
+    is_mixed out.glb
+    pipe 'vg-encode out.glb | vg-info -'
+    shows "animation  'Wave': 46 frames, 0 s to 0.75 s" "animation  'Nod': 31 frames, 0 s to 0.5 s"
     pipe 'vg-encode in.glb | vg-decode -q --name Both -o out.glb'
     is_mixed out.glb
     pipe 'vg-encode --scale 1.00001 --animation Wave in.glb | vg-decode -o out.glb'

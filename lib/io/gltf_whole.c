@@ -9,7 +9,7 @@
 
 /* Shares of D, and of a coordinate, whose binary32 the stream may hold. */
 static const double near_in_d = 1e-7, near_in_place = 1.2e-7;
-static const double near_in_time = 1e-5, near_in_step = 1e-3; /* seconds, and a share of a step */
+static const double near_in_time = 1e-5; /* seconds */
 
 /* ---- poses ---- */
 
@@ -59,33 +59,17 @@ static bool is_named_by(const vgi_gltf_clip *c, size_t i, const char *frame)
     return !c->name || (vg_frame_stem(frame, &number) == strlen(c->name) && !memcmp(frame, c->name, strlen(c->name)));
 }
 
-static bool same_time(double a, double b)
+/* Whether the next frame of the present animation is at its next key, by time and name. */
+static bool is_next(const vgi_gltf_whole *k, const vg_frame *f)
 {
-    return fabs(a - b) <= near_in_time;
+    return k->clip != SIZE_MAX && k->count < moments_of(k, k->clip) &&
+           fabs(f->time - moment_of(k, k->clip, k->count)->time) <= near_in_time &&
+           is_named_by(&k->x->clips[k->clip], k->count, f->name);
 }
 
-static void count_frame(vgi_gltf_whole *k, double time)
-{
-    const size_t i = k->count++;
-    k->keyed = k->keyed && i < moments_of(k, k->clip) && same_time(time, moment_of(k, k->clip, i)->time);
-    if (i == 1) k->step = time - k->last;
-    if (i > 1) k->even = k->even && fabs(time - k->last - k->step) <= near_in_step * k->step;
-    k->last = time;
-}
-
-/* Whether the frames are a whole animation: all of its keys, or no fewer samples from its beginning to its end. */
 static bool is_whole_clip(const vgi_gltf_whole *k)
 {
-    const size_t n = moments_of(k, k->clip);
-    const double left = moment_of(k, k->clip, n - 1)->time - k->last;
-    if (k->keyed && k->count == n) return true;
-    return k->even && k->count > 1 && k->count >= n && left < k->step * (1 + near_in_step) && left > -near_in_time;
-}
-
-/* Frames have the times of the file, or begin at 0, as samples do. */
-static bool begins_at(const vgi_gltf_moment *first, double time)
-{
-    return same_time(first->time, time) || time == 0;
+    return k->count == moments_of(k, k->clip);
 }
 
 /* 1: a clip that is not used yet begins with this frame. */
@@ -93,24 +77,18 @@ static int begin_clip(vgi_gltf_whole *k, const vg_frame *f, vg_err *e)
 {
     int r = 0;
     if (k->clip != SIZE_MAX && !is_whole_clip(k)) return 0;
-    for (size_t i = 0; i < k->x->nclips && r == 0; i++) {
-        const vgi_gltf_moment *first = moment_of(k, i, 0);
-        if (k->used[i] || !is_named_by(&k->x->clips[i], 0, f->name) || !begins_at(first, f->time)) continue;
-        r = shows_moment(k, first, f->values, e);
-        if (r < 1) continue;
-        k->used[i] = k->keyed = k->even = true;
-        k->clip = i, k->count = 0, k->shift = first->time - f->time;
-    }
-    if (r == 1) count_frame(k, f->time + k->shift);
+    k->count = 0;
+    for (k->clip = 0; k->clip < k->x->nclips && r == 0; k->clip += r == 0)
+        if (!k->used[k->clip] && is_next(k, f)) r = shows_moment(k, moment_of(k, k->clip, 0), f->values, e);
+    if (r == 1) k->used[k->clip] = true, k->count = 1;
     return r;
 }
 
 static int put_timed(vgi_gltf_whole *k, const vg_frame *f, vg_err *e)
 {
-    const bool goes_on = k->clip != SIZE_MAX && f->time + k->shift > k->last && is_named_by(&k->x->clips[k->clip], k->count, f->name);
-    if (!goes_on) return begin_clip(k, f, e);
-    int r = shows_moment(k, &(vgi_gltf_moment){k->clip, f->time + k->shift}, f->values, e);
-    if (r == 1) count_frame(k, f->time + k->shift);
+    if (!is_next(k, f)) return begin_clip(k, f, e);
+    int r = shows_moment(k, moment_of(k, k->clip, k->count), f->values, e);
+    k->count++;
     return r;
 }
 

@@ -19,9 +19,8 @@ typedef struct vgi_gltf_whole {
     double near;
     bool *used;                /* clips */
     /* the animation that is being compared: */
-    bool timed, keyed, even;   /* keyed: its frames are at its keys, even: at equal distances */
-    size_t clip, count;        /* SIZE_MAX: none; frames of it */
-    double last, step, shift; /* shift: from the frames' times to those of the file */
+    bool timed;
+    size_t clip, count;        /* SIZE_MAX: none; frames of it, one for each key */
 } vgi_gltf_whole;
 
 /* vgi_gltf_whole_open: read the animations. The caller clears it in any case. */
