@@ -223,6 +223,58 @@ assert [a.get("name") for a in rich.load("edited.glb")[0]["animations"]] == ["un
 END
 }
 
+# Normals that say otherwise than the angle between faces: a cube that is smooth, a strip that is sharp where it bends by 20
+# degrees, though its groups say that it is smooth, and a cube with the normals of its faces, which needs no group.
+@test "normals of an OBJ say where it is sharp: in GLB and, as smoothing groups, in OBJ" {
+    py <<'END'
+import math
+cube = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+sides = [(0, 0, -1), (0, 0, 1), (0, -1, 0), (0, 1, 0), (-1, 0, 0), (1, 0, 0)]
+def write(name, points, normals, corners, head=""):
+    with open(name, "w") as f:
+        for p in points: f.write("v %g %g %g\n" % p)
+        for n in normals: f.write("vn %.4f %.4f %.4f\n" % n)
+        f.write(head)
+        for face, of in corners: f.write("f " + " ".join(f"{v + 1}//{n + 1}" for v, n in zip(face, of)) + "\n")
+write("flat.obj", cube, sides, [(f, [i] * 4) for i, f in enumerate(faces)])
+write("smooth.obj", cube, [tuple((2 * c - 1) / 3 ** 0.5 for c in p) for p in cube], [(f, f) for f in faces], "o Cube\n")
+a = math.radians(20)
+xz = [(0, 0), (1, 0), (1 + math.cos(a), math.sin(a)), (2 + math.cos(a), math.sin(a))]
+write("strip.obj", [(x, y, z) for y in (0, 1) for x, z in xz], [(0, 0, 1), (-math.sin(a), 0, math.cos(a))],
+      [((i, i + 1, i + 5, i + 4), [n] * 4) for i, n in ((0, 0), (1, 1), (2, 0))], "s 1\nusemtl Steel\n")
+write("bad.obj", cube, sides[:3], [(f, [i] * 4) for i, f in enumerate(faces)])
+END
+    local name
+    for name in flat smooth strip bad; do
+        must vg-decode -q $name.obj -o $name.out.obj
+        must vg-decode -q $name.obj -o $name.glb
+    done
+    # (grep fails where there is nothing)
+    ! grep -q '^s' flat.out.obj bad.out.obj
+    [ "$(grep -v '^[vf]' smooth.out.obj)" = "$(printf 'o Cube\ns 1')" ]
+    [ "$(grep -v '^[vf]' strip.out.obj)" = "$(printf 'usemtl Steel\ns off')" ]
+    must vg-decode -q strip.out.obj -o again.obj
+    must cmp strip.out.obj again.obj
+    py <<'END'
+import json, math, struct
+def normals(name):
+    b = open(name, "rb").read()
+    n, = struct.unpack("<I", b[12:16])
+    g, data, found = json.loads(b[20:20 + n]), b[28 + n:], set()
+    a = g["accessors"][g["meshes"][0]["primitives"][0]["attributes"]["NORMAL"]]
+    v = g["bufferViews"][a["bufferView"]]
+    for k in range(a["count"]):
+        x = struct.unpack_from("<3f", data, v["byteOffset"] + a.get("byteOffset", 0) + k * v.get("byteStride", 12))
+        found.add(tuple(round(c, 3) + 0.0 for c in x))
+    return a["count"], found
+assert normals("flat.glb")[0] == 24 and normals("bad.glb")[0] == 24
+count, found = normals("smooth.glb")
+assert count == 8 and all(max(abs(abs(c) - 3 ** -0.5) for c in n) < 1e-3 for n in found), found
+assert normals("strip.glb") == (12, {(0, 0, 1), (-0.342, 0, 0.94)}), normals("strip.glb")
+END
+}
+
 @test "what is edited, cut, renamed or asked for is written as morph targets" {
     make_rich
     must vg-encode --animation Wave in.glb -o wave.vgs

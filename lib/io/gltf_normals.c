@@ -3,14 +3,13 @@
  * artist, are in gltf_character.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_normals.h"
+#include "io/smoothing.h"
 #include "model/incidence.h"
 #include "numeric/face.h"
 #include "numeric/sets.h"
 
 #include <math.h>
 #include <stdlib.h>
-
-static const double least_cosine = 0.5; /* cosine of the largest angle, 60 degrees, at which faces form one surface */
 
 /* The unit normal of a possibly bent face; zero if it has no area. */
 static void face_normal(const vg_mesh *m, size_t f, const double *pose, double n[3])
@@ -81,25 +80,11 @@ static void join_corners(uint32_t *parent, uint32_t c, uint32_t d)
     else parent[c] = d;
 }
 
-/* Smoothing of each face: SMOOTH_BY_ANGLE without labels; 0: flat; otherwise a number that neighbours must share. */
-enum { SMOOTH_BY_ANGLE = -1 };
-
-static void read_smoothing(const vg_mesh *m, const vg_attributes *a, int64_t *of)
-{
-    size_t next = 0;
-    int64_t now = SMOOTH_BY_ANGLE;
-    for (size_t f = 0; f < m->nf; f++) {
-        for (; a && next < a->nlabels && a->labels[next].face <= f; next++)
-            if (a->labels[next].kind == VG_LABEL_SMOOTHING) now = labs(strtol(a->labels[next].text, NULL, 10)); /* "off" gives 0 */
-        of[f] = now;
-    }
-}
-
 static bool is_smooth(const side *s, const side *t, const int64_t *smoothing, const double *normal)
 {
     if (smoothing[s->face] != smoothing[t->face]) return false;
-    if (smoothing[s->face] != SMOOTH_BY_ANGLE) return smoothing[s->face] != 0;
-    return vgi_dot(normal + 3 * (size_t)s->face, normal + 3 * (size_t)t->face) > least_cosine;
+    if (smoothing[s->face] != VGI_SMOOTH_BY_ANGLE) return smoothing[s->face] != 0;
+    return vgi_dot(normal + 3 * (size_t)s->face, normal + 3 * (size_t)t->face) > vgi_least_cosine;
 }
 
 static void unite_corners(uint32_t *parent, const side *sides, size_t n, const int64_t *smoothing, const double *normal)
@@ -136,7 +121,7 @@ int vgi_gltf_normals_make(vgi_gltf_normals *x, const vg_mesh *m, const vg_attrib
     int r = parent && sides && ends && smoothing && normal && x->corner ? VG_OK : VG_ENOMEM;
 
     if (r == VG_OK) {
-        read_smoothing(m, a, smoothing);
+        vgi_smoothing_of(m, a, smoothing);
         for (uint32_t c = 0; c < corners; c++) parent[c] = c;
         for (size_t f = 0; f < m->nf; f++) face_normal(m, f, reference, normal + 3 * f);
         unite_corners(parent, sides, list_sides(m, ends, sides), smoothing, normal);

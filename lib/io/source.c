@@ -7,6 +7,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_pack.h"
 #include "io/items.h"
+#include "io/smoothing.h"
 
 #include <stdlib.h>
 
@@ -147,7 +148,8 @@ static int take_over_model(vg_source *s, pose *p, vg_err *e)
     if (r < 0) return r;
     s->head.body.reference = vgi_copy_array(m->vertices, 3 * s->own.count, sizeof(double), e);
     s->head.body.reference_name = vgi_copy_string(p->name, strlen(p->name), e);
-    return s->head.body.reference && s->head.body.reference_name ? VG_OK : VG_ENOMEM;
+    if (!s->head.body.reference || !s->head.body.reference_name) return VG_ENOMEM;
+    return vgi_obj_take_smoothing(&s->head.body, (const char *)p->data.data, p->data.size, e);
 }
 
 /* VG_EINPUT if the next input has other faces than the previous ones. */
