@@ -108,8 +108,11 @@ static void say_way(const vg_way *way, const char *to)
     else if (opts.merge > 0) cli_note("to %s: the runs from both keys came within %.3g %% of the range, pair %zu", to, miss, way->tries);
     else if (opts.optimise)
         cli_note("to %s: after %zu rounds of optimisation the run %s missed it by %.3g %% of the range", to, way->tries,
-                 way->backward ? "from there back" : "there", miss);
-    else cli_note("to %s: the run %s missed it by %.3g %% of the range", to, way->backward ? "from there back" : "there", miss);
+                 way->backward > 0 ? "from there back" : "there", miss);
+    else if (way->backward > 0)
+        cli_note("to %s: the better run missed it by %.3g %% of the range; of the run from there back %.0f %% is taken", to, miss,
+                 100 * way->backward);
+    else cli_note("to %s: the run there missed it by %.3g %% of the range", to, miss);
 }
 
 static void cross_gap(gap *w, vg_generator *g, const double *key, bool loop, const char *to)

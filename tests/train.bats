@@ -62,7 +62,7 @@ horse() { echo "$BATS_FILE_TMPDIR/horse.$1"; }
     must cmp one.net resumed.net
 }
 
-@test "keys go out as they came in, with poses between: by the better way, by the best found, by ways that meet" {
+@test "keys go out as they came in, with poses between: by the mean of both ways, by the best found, by ways that meet" {
     must vg-encode --reference "$DATA/horse.rest.obj" --take 1,9,15 "$DATA/horse-run.tar.xz" -o keys.vgs
     for options in "" "--optimise" "--merge 5%" "--seed 7" "--root stay"; do
         must vg-generate -q --no-provenance -j 1 --between 4 $options "$(horse net)" keys.vgs -o between.vgs

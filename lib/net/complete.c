@@ -1,8 +1,10 @@
 /* complete.c: completion of motion between keys (L 4.4; MATH 12).
  *
  * A run starts from the first key forward, or from the second backward. Its error at the other key is spread over the
- * run linearly, so that both keys are met exactly. By default the better of the two runs is taken. Alternatively the
- * initial states are optimised first; or, as printed, random states are tried until the runs from both keys meet.
+ * run linearly, so that both keys are met exactly. By default both runs are taken, as a mean with weights of one over
+ * their squared errors: a run that is held at both ends errs in between in proportion to what it missed.
+ * Alternatively the initial states are optimised first, and the better run is taken; or, as printed, random states are
+ * tried until the runs from both keys meet.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/generator.h"
 
@@ -116,12 +118,11 @@ static void subtract_frames(const double *a, const double *b, size_t n, double *
     for (size_t k = 0; k < n; k++) to[k] = a[k] - b[k];
 }
 
-/* Choose the better of the forward and backward runs. */
-static int find_spread(way *w, vg_err *e)
+/* Run from both keys, or from the first only. far: how far each run ended from the other key. */
+static int run_both(way *w, double far[2], vg_err *e)
 {
     vg_generator *g = w->g;
     size_t n = w->n, numbers = g->net->numbers;
-    double *miss = g->numbers, far[2] = {0, INFINITY};
     vgi_reach reach;
     int r = VG_OK;
     vgi_generator_states(g, false, 0);
@@ -132,17 +133,46 @@ static int find_spread(way *w, vg_err *e)
     if (r == VG_OK) r = run_forward(w, 1, e);
     if (r < 0) return r;
     far[0] = frame_distance(w->to.frame, w->forward[0] + n * numbers, numbers);
-    if (g->net->direction != VG_FORWARD) {
-        vgi_generator_states(g, true, 0);
-        r = run_back(w, 1, e);
-        far[1] = frame_distance(w->from.frame, w->back[0] + n * numbers, numbers);
-    }
-    w->found.backward = far[1] < far[0];
-    const double *along = w->found.backward ? w->back[0] : w->forward[0];
-    subtract_frames(w->found.backward ? w->from.frame : w->to.frame, along + n * numbers, numbers, miss);
-    w->found.miss = share_of_range(w, fmin(far[0], far[1]));
-    spread_miss(w, along, miss, n + 1, n, w->found.backward);
+    if (g->net->direction == VG_FORWARD) return VG_OK;
+    vgi_generator_states(g, true, 0);
+    r = run_back(w, 1, e);
+    far[1] = frame_distance(w->from.frame, w->back[0] + n * numbers, numbers);
     return r;
+}
+
+/* The path is the mean of both runs, each with its error spread over it. back: the weight of the second. */
+static void mix_runs(way *w, double back)
+{
+    size_t n = w->n, numbers = w->g->net->numbers;
+    const double *there = w->forward[0], *from = w->back[0], *end = there + n * numbers, *begin = from + n * numbers;
+    for (size_t t = 0; t < n; t++) {
+        double part = (double)(t + 1) / (double)(n + 1);
+        const double *a = there + t * numbers, *b = from + (n - 1 - t) * numbers;
+        for (size_t k = 0; k < numbers; k++)
+            w->path[t * numbers + k] = (1 - back) * (a[k] + part * (w->to.frame[k] - end[k])) +
+                                       back * (b[k] + (1 - part) * (w->from.frame[k] - begin[k]));
+    }
+}
+
+/* Choose the better of the forward and backward runs, or mix them. */
+static int find_spread(way *w, vg_err *e)
+{
+    size_t n = w->n, numbers = w->g->net->numbers;
+    double *miss = w->g->numbers, far[2] = {0, INFINITY};
+    int r = run_both(w, far, e);
+    if (r < 0) return r;
+    w->found.miss = share_of_range(w, fmin(far[0], far[1]));
+    if (!w->g->o.optimise && far[1] < INFINITY && far[0] + far[1] > 0) {
+        w->found.backward = far[0] * far[0] / (far[0] * far[0] + far[1] * far[1]);
+        mix_runs(w, w->found.backward);
+        return VG_OK;
+    }
+    bool back = far[1] < far[0];
+    const double *along = back ? w->back[0] : w->forward[0];
+    w->found.backward = back;
+    subtract_frames(back ? w->from.frame : w->to.frame, along + n * numbers, numbers, miss);
+    spread_miss(w, along, miss, n + 1, n, back);
+    return VG_OK;
 }
 
 /* Find where the two runs of a lane are nearest at the same time: frame at + 1 of n; returns the distance. */

@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-enum { SINGLE = 4 }; /* one in so many iterations starts from single frames */
+enum { SINGLE = 8 }; /* one in so many iterations starts from single frames */
 
 typedef struct working {
     vg_trainer *t;

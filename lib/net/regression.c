@@ -195,6 +195,16 @@ int vgi_regression_fit(vgi_regression *g, const vgi_frames *f, bool back, double
     return r == VG_OK ? make_stable(g, e) : r;
 }
 
+void vgi_regression_even(vgi_regression *there, vgi_regression *back)
+{
+    size_t n = there->numbers;
+    for (size_t i = 0; i < n * n; i++) back->first[i] = (back->first[i] - there->first[i]) / 2, there->first[i] = -back->first[i];
+    for (size_t i = 0; i < n; i++) {
+        back->first_shift[i] = (back->first_shift[i] - there->first_shift[i]) / 2;
+        there->first_shift[i] = -back->first_shift[i];
+    }
+}
+
 /* ---- choice of the ridge ---- */
 
 static const double tiny = 1e-12; /* added to errors, which may be 0 */
@@ -258,6 +268,7 @@ static void try_one(void *context, size_t task)
     if (r == VG_OK) r = fit_unstabilised(&g, &f->fitted, false, c->size, choice, NULL);
     if (r == VG_OK && c->first) r = vgi_regression_make(&back, n, NULL);
     if (r == VG_OK && c->first) r = fit_unstabilised(&back, &f->fitted, true, c->size, choice, NULL);
+    if (r == VG_OK && c->first) vgi_regression_even(&g, &back);
     c->found[task] = r == VG_OK ? try_out(&g, c->first ? &back : NULL, &f->tried, room) : (trial_sum){INFINITY, 1};
     c->code[task] = r;
     vgi_regression_clear(&g);

@@ -44,6 +44,10 @@ typedef struct vgi_choice {
 int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double size, const vgi_choice *choice,
                        vg_err *e) VG_MUST_CHECK;
 
+/* vgi_regression_even: the step from a single frame becomes the mean of the one forward and of the one backward,
+ * turned round: that of the frame before is not known, and the two differ by what the motion gains in a frame. */
+void vgi_regression_even(vgi_regression *there, vgi_regression *back);
+
 /* A block that is left out of the fit and then predicted. The first two frames of each sequence in `tried` are
  * given. */
 typedef struct vgi_fold {

@@ -244,6 +244,7 @@ static int fit_regressions(vg_trainer *t, vg_err *e)
             r = vgi_regression_fit(&t->regression[back], &fitted, back, t->data.sigma, &t->choice, e);
     }
     vgi_blas_shared();
+    if (r == VG_OK) vgi_regression_even(&t->regression[0], &t->regression[1]);
     free((void *)fitted.row);
     free((void *)fitted.start);
     if (r < 0 || t->o.model != VG_NETWORK_AUTO) return r;

@@ -121,9 +121,9 @@ typedef struct vg_generate_options {
 
 /* How a way from key to key was found. */
 typedef struct vg_way {
-    bool backward;     /* it is the way from the second key back to the first */
+    double backward;   /* weight of the way from the second key back to the first, in the mean of both */
     bool merged;       /* both ways came near enough, and are joined where they are nearest */
-    double miss;       /* how far the end was from the key, or both ways from one another, as a share of the training's
+    double miss;       /* how far the end of the better one was from the key, or both ways from one another, as a share of the training's
                           range, before it was spread over the way */
     size_t tries;      /* pairs of ways that were looked at, or rounds of the search */
 } vg_way;

@@ -128,13 +128,13 @@ def keys():
     poses = sequence("walk-man", "human")
     if not os.path.exists("walk.1.net"):
         train(poses, "--hold 0.2326 --hold-at end", "walk.1.net")
-    for name, options in (("the better way", ""), ("optimised", "--optimise"), ("merged", "--merge 5%")):
+    for name, options in (("the mean of both ways", ""), ("optimised", "--optimise"), ("merged", "--merge 5%")):
         row(f"walk-man, keys 10, 17, 33 apart, {name}", gaps(poses, "walk.1.net", 66, 86, options))
     poses = sequence("trex-walk", "hybrid", 5)
     if not os.path.exists("trex.net"):
         train(poses, "--model pca --given 1 --iterations 800 --hold-at end", "trex.net")
     count = json.loads(subprocess.check_output(["vg-info", "--json", poses]))["frames"]
-    row("trex-walk, keys 10, 17, 33 apart, the better way", gaps(poses, "trex.net", count - 34, count, ""), (0.45, 0.35, 0.30))
+    row("trex-walk, keys 10, 17, 33 apart, the mean of both ways", gaps(poses, "trex.net", count - 34, count, ""), (0.45, 0.35, 0.30))
     row("trex-walk, keys 10, 17, 33 apart, merged", gaps(poses, "trex.net", count - 34, count, "--merge 5%"))
 
 

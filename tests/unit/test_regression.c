@@ -97,5 +97,32 @@ static void rhythm_is_learned(void)
     CHECK(choose(rows).ridge <= 1e-3);
 }
 
-TESTS({"stable motion is learned", stable_motion_is_learned}, {"growing motion keeps its rhythm", growing_motion_keeps_its_rhythm},
+/* On a circle with a speed of w a frame, the steps forward and backward from a frame c are (R(w) - 1) c and (R(-w) - 1) c;
+ * their mean, turned round, is a quarter turn of c times sin w. */
+static void steps_from_one_frame_are_even(void)
+{
+    enum { N = 2 };
+    const double w = 0.3, there[N * N] = {cos(w) - 1, sin(w), -sin(w), cos(w) - 1},
+                 back[N * N] = {cos(w) - 1, -sin(w), sin(w), cos(w) - 1}, quarter[N * N] = {0, sin(w), -sin(w), 0};
+    vg_err e;
+    vgi_regression a, b;
+    CHECK(vgi_regression_make(&a, N, &e) == VG_OK && vgi_regression_make(&b, N, &e) == VG_OK);
+    memcpy(a.first, there, sizeof there), memcpy(b.first, back, sizeof back);
+    a.first_shift[1] = 0.5, b.first_shift[1] = -0.1;
+    vgi_regression_even(&a, &b);
+    for (size_t i = 0; i < N * N; i++) {
+        CHECK_NEAR(a.first[i], quarter[i], 1e-15);
+        CHECK_NEAR(b.first[i], -quarter[i], 1e-15);
+    }
+    const double c[N] = {2, 1};
+    double next[N], before[N];
+    vgi_regression_next(&a, c, NULL, next);
+    vgi_regression_next(&b, c, NULL, before);
+    for (size_t k = 0; k < N; k++) CHECK_NEAR(next[k] + before[k], 2 * c[k], 1e-15);
+    CHECK_NEAR(next[1], 1 + 2 * sin(w) + 0.3, 1e-15);
+    vgi_regression_clear(&a);
+    vgi_regression_clear(&b);
+}
+
+TESTS({"steps from one frame are even", steps_from_one_frame_are_even}, {"stable motion is learned", stable_motion_is_learned}, {"growing motion keeps its rhythm", growing_motion_keeps_its_rhythm},
       {"damped motion is left alone", damped_motion_is_left_alone}, {"rhythm is learned", rhythm_is_learned})
