@@ -39,8 +39,8 @@ int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_json *asset = vgi_json_copy(vgi_json_get(w->character->scene.g.json, "asset"), e);
     int r = asset ? vgi_json_put(asset, "generator", vgi_json_of_text("vg " VG_VERSION, e), e) : VG_ENOMEM;
-    const bool lists = w->character->touches && !w->whole; /* its own file says which vertices are one */
-    if (r == VG_OK && !w->whole) vgi_json_drop(vgi_json_inner(asset, "extras"), VGI_GLTF_VERTICES);
+    const bool lists = w->character->touches && !w->as_it_was; /* its own file says which vertices are one */
+    if (r == VG_OK && !w->as_it_was) vgi_json_drop(vgi_json_inner(asset, "extras"), VGI_GLTF_VERTICES);
     if (r == VG_OK && lists) r = ensure_extras(asset, e);
     if (r == VG_OK && lists) r = list_vertices(w->character, vgi_json_inner(asset, "extras"), e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "{\"asset\":");
@@ -105,8 +105,8 @@ static int trim(vgi_gltf_writing *w, bool quantized, vg_err *e)
     if (r == VG_OK) find_uses(x, &u);
     for (size_t m = 0; m < n && r == VG_OK; m++)
         if (u.meshes[m]) trim_primitives(vgi_json_inner_at(meshes, m), w->whole, u.skinned[m]);
-    const vgi_gltf_pruned pruned = {w->whole ? NULL : u.meshes, quantized ? u.bound : NULL,
-                                    !w->whole && (quantized || !w->character->kept)};
+    const vgi_gltf_pruned pruned = {w->as_it_was ? NULL : u.meshes, quantized ? u.bound : NULL,
+                                    !w->as_it_was && (quantized || !w->character->kept)};
     if (r == VG_OK) r = vgi_gltf_prune(&x->g, &pruned, &w->asset, e);
     free(u.meshes);
     free(u.skinned);
@@ -125,8 +125,8 @@ int vgi_gltf_trim_cast(vgi_gltf_writing *w, bool quantized, vg_err *e)
 int vgi_gltf_trim_whole(vgi_gltf_writing *w, vg_err *e)
 {
     int r = vgi_gltf_whole_trim(w->whole, w->clip, e);
-    if (r == VG_OK) r = vgi_gltf_raise_skins(&w->character->scene, w->character->scene.g.json, e);
-    return r < 0 ? r : trim(w, false, e);
+    if (r == VG_OK && w->as_it_was) r = vgi_gltf_raise_skins(&w->character->scene, w->character->scene.g.json, e);
+    return r < 0 ? r : trim(w, w->quantized, e);
 }
 
 /* ---- meshes ---- */
@@ -159,7 +159,7 @@ static int add_primitive(vgi_json *primitives, const vgi_gltf_scene *x, const vg
     int r = vgi_json_add(primitives, primitive, e);
     if (r < 0) return r;
     vgi_json *attributes = vgi_json_inner(primitive, "attributes");
-    vgi_json_drop(vgi_json_inner(primitive, "extras"), "targetNames");
+    if (!k->own_targets) vgi_json_drop(vgi_json_inner(primitive, "extras"), "targetNames");
     if (x->parts[piece->part].skin == VGI_GLTF_NONE) drop_influences(attributes);
     r = put_number(attributes, "POSITION", l->position, e);
     if (r == VG_OK && l->normals) r = put_number(attributes, "NORMAL", l->normal, e);
@@ -203,6 +203,7 @@ static int add_mesh(vgi_json *meshes, const vgi_gltf_scene *x, size_t node, cons
     if (r == VG_OK) r = vgi_json_put(mesh, "primitives", primitives = vgi_json_array(e), e);
     for (size_t i = 0; i < x->npieces && r == VG_OK; i++)
         if (x->parts[x->pieces[i].part].node == node) r = add_primitive(primitives, x, &x->pieces[i], k, e);
+    if (r < 0 || k->own_targets) return r;
     vgi_json_drop(mesh, "weights");
     vgi_json_drop(vgi_json_inner(mesh, "extras"), "targetNames");
     if (r == VG_OK && k->targets) r = add_weights(mesh, x, node, k, e);
@@ -227,7 +228,7 @@ static int cast_nodes(vgi_json *doc, const vgi_gltf_scene *x, const vgi_gltf_cas
     for (size_t i = 0; i < x->nnodes && r == VG_OK; i++) {
         vgi_json *node = vgi_json_inner_at(nodes, i);
         drop_instancing(node);
-        vgi_json_drop(node, "weights");
+        if (!k->own_targets) vgi_json_drop(node, "weights");
         if (!shows_mesh(x, i, &mesh)) {
             vgi_json_drop(node, "mesh");
             vgi_json_drop(node, "skin");
@@ -276,8 +277,12 @@ static void drop_made(vgi_json *doc)
 
 int vgi_gltf_say_whole(vgi_gltf_writing *w, vg_err *e)
 {
-    drop_made(w->character->scene.g.json);
-    return say_members(w, w->character->scene.g.json, e);
+    vgi_json *doc = vgi_json_copy(w->character->scene.g.json, e);
+    if (!doc) return VG_ENOMEM;
+    drop_made(doc);
+    int r = say_members(w, doc, e);
+    vgi_json_free(&doc);
+    return r;
 }
 
 int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e)

@@ -125,14 +125,14 @@ static int by_seat(const void *a, const void *b)
     return (s->vertex > t->vertex) - (s->vertex < t->vertex);
 }
 
-static int find_touches(vgi_gltf_character *c, vg_err *e)
+int vgi_gltf_find_touches(vgi_gltf_character *c, const float *base, vg_err *e)
 {
     seat *seats = vgi_array_raw(c->n, sizeof *seats, e);
     if (!seats) return VG_ENOMEM;
     for (size_t i = 0; i < c->scene.nparts; i++) {
         const vgi_gltf_part *p = &c->scene.parts[i];
         for (size_t f = p->first; f < p->first + p->count; f++) {
-            const float *at = c->base + 3 * f;
+            const float *at = base + 3 * f;
             seats[f] = (seat){{at[0], at[1], at[2]}, c->vertex[f], p->node, (size_t)p->instance};
         }
     }
@@ -374,7 +374,7 @@ int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e)
     vgi_gltf_rest(&c->scene);
     if ((r = place_vertices(c, e)) <= 0) return r;
     r = find_base(c, b, e);
-    if (r == VG_OK) r = find_touches(c, e);
+    if (r == VG_OK) r = vgi_gltf_find_touches(c, c->base, e);
     if (r == VG_OK) r = find_normals(c, b, e);
     return r < 0 ? r : 1;
 }

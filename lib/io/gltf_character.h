@@ -34,6 +34,8 @@ typedef struct vgi_gltf_character {
  * The caller clears it in any case. */
 int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_character_clear(vgi_gltf_character *c);
+/* vgi_gltf_find_touches: look whether different vertices coincide in this base: n x 3. */
+int vgi_gltf_find_touches(vgi_gltf_character *c, const float *base, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_character_pose, _move: displacements of the file's vertices from base, for a pose of the mesh (world) or
  * for displacements of the mesh (moved). Zero displacements stay zero. */
 void vgi_gltf_character_pose(const vgi_gltf_character *c, const double *world, const float *moved, float *to);

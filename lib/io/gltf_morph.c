@@ -78,6 +78,7 @@ static int take_frames(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
     if (!(x->chosen = vgi_array(w->frames, sizeof *x->chosen, e))) return VG_ENOMEM;
+    if (w->whole) return VG_OK; /* the animations of the file */
     int r = load_frame(w, 0, x->first, e);
     const bool skip = r == VG_OK && w->still && moves_nothing(x->first, 3 * w->h->body.mesh.nv);
     for (size_t i = skip; i < w->frames && r == VG_OK; i++) x->chosen[x->targets++] = i;
@@ -340,7 +341,7 @@ static int say_cast(vgi_gltf_writing *w, vg_err *e)
     const vgi_gltf_morphs *x = w->own;
     vgi_json *names = NULL;
     int r = name_targets(w, &names, e);
-    const vgi_gltf_cast cast = {x->lists, x->targets, target_of, x, names, w->still, x->grids, x->ngrids};
+    const vgi_gltf_cast cast = {x->lists, x->targets, target_of, x, names, w->whole, w->still, x->grids, x->ngrids};
     if (r == VG_OK) r = vgi_gltf_say_cast(w, &cast, e);
     vgi_json_free(&names);
     return r;
@@ -370,7 +371,7 @@ static int say_scene(vgi_gltf_writing *w, vg_err *e)
 static int describe_morphs(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_morphs *x = w->own;
-    if (w->whole) return vgi_gltf_say_whole(w, e);
+    if (w->as_it_was) return vgi_gltf_say_whole(w, e);
     int r = choose_targets(w, e);
     if (r == VG_OK) r = list_vertices(w, e);
     if (r == VG_OK) r = turn_basis(w, e);
@@ -400,7 +401,7 @@ static int emit_weights(vgi_gltf_writing *w, vg_err *e)
 
 static int emit_morphs(vgi_gltf_writing *w, vg_err *e)
 {
-    if (w->whole) return VG_OK;
+    if (w->as_it_was) return VG_OK;
     int r = w->still ? VG_OK : emit_weights(w, e);
     return r < 0 ? r : vgi_gltf_emit_targets(w, e);
 }
@@ -421,11 +422,12 @@ static bool report(const vgi_gltf_writing *w, char *to, size_t room)
 {
     const vgi_gltf_morphs *x = w->own;
     const double d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
-    if (w->whole) {
+    if (w->as_it_was) {
         snprintf(to, room, "what moves is as it was in the GLB that was read");
         return false;
     }
-    int n = w->still && !x->targets ? snprintf(to, room, "no morph targets")
+    int n = w->whole ? snprintf(to, room, "what moves is as it was in the GLB that was read")
+            : w->still && !x->targets ? snprintf(to, room, "no morph targets")
                                     : snprintf(to, room, "%zu morph target%s for %zu frame%s", x->targets,
                                                x->targets == 1 ? "" : "s", w->frames, w->frames == 1 ? "" : "s");
     if (x->chosen && !x->quantize) {

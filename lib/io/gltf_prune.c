@@ -46,11 +46,11 @@ static bool is_replaced(const pruning *k, const char *attribute)
     return k->which->replaced && (!strcmp(attribute, "POSITION") || !strcmp(attribute, "NORMAL"));
 }
 
-static int visit_attributes(pruning *k, vgi_json *attributes)
+static int visit_attributes(pruning *k, vgi_json *attributes, bool base)
 {
     int r = VG_OK;
     for (const char *key = vgi_json_key(attributes, NULL); key && r == VG_OK; key = vgi_json_key(attributes, key))
-        if (k->numbered || !is_replaced(k, key)) r = refer_to_accessor(k, attributes, key);
+        if (k->numbered || !base || !is_replaced(k, key)) r = refer_to_accessor(k, attributes, key);
     return r;
 }
 
@@ -60,10 +60,11 @@ static int visit_mesh(pruning *k, vgi_json *mesh)
     int r = VG_OK;
     for (size_t i = 0; i < vgi_json_count(primitives) && r == VG_OK; i++) {
         vgi_json *primitive = vgi_json_inner_at(primitives, i), *targets = vgi_json_inner(primitive, "targets");
-        r = visit_attributes(k, vgi_json_inner(primitive, "attributes"));
+        const bool base = !vgi_json_count(targets); /* with targets of their own they stay */
+        r = visit_attributes(k, vgi_json_inner(primitive, "attributes"), base);
         if (r == VG_OK) r = refer_to_accessor(k, primitive, "indices");
         for (size_t t = 0; t < vgi_json_count(targets) && r == VG_OK; t++)
-            r = visit_attributes(k, vgi_json_inner_at(targets, t));
+            r = visit_attributes(k, vgi_json_inner_at(targets, t), false);
     }
     return r;
 }
@@ -71,7 +72,7 @@ static int visit_mesh(pruning *k, vgi_json *mesh)
 static int visit_node(pruning *k, vgi_json *node)
 {
     vgi_json *instances = vgi_json_inner(vgi_json_inner(node, "extensions"), "EXT_mesh_gpu_instancing");
-    return visit_attributes(k, vgi_json_inner(instances, "attributes"));
+    return visit_attributes(k, vgi_json_inner(instances, "attributes"), false);
 }
 
 static int visit_skins(pruning *k)

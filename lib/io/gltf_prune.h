@@ -8,7 +8,7 @@
 typedef struct vgi_gltf_pruned {
     const bool *meshes; /* which are used; NULL: all */
     const bool *bound;  /* skins whose inverse bind matrices are replaced, with the same result; NULL: none */
-    bool replaced;      /* positions and normals are: their accessors are not used, and references to them become 0 */
+    bool replaced;      /* positions and normals of meshes without morph targets are: their accessors are not used, and references to them become 0 */
 } vgi_gltf_pruned;
 
 /* vgi_gltf_prune: accessors and views that are used get consecutive numbers in the document; the others go. The bytes of the

@@ -157,6 +157,23 @@ static int add_child(vgi_json *node, size_t child, vg_err *e)
     return vgi_json_add(vgi_json_inner(node, key), vgi_json_of_whole(child, e), e);
 }
 
+/* Animations of a node without morph targets move the one above. */
+static int aim_animations(vgi_json *doc, size_t from, size_t to, vg_err *e)
+{
+    vgi_json *all = vgi_json_inner(doc, "animations");
+    int r = VG_OK;
+    for (size_t i = 0; i < vgi_json_count(all); i++) {
+        vgi_json *channels = vgi_json_inner(vgi_json_inner_at(all, i), "channels");
+        for (size_t c = 0; c < vgi_json_count(channels) && r == VG_OK; c++) {
+            vgi_json *target = vgi_json_inner(vgi_json_inner_at(channels, c), "target");
+            uint64_t node;
+            if (vgi_json_whole(vgi_json_get(target, "node"), &node) && node == from)
+                r = vgi_json_put(target, "node", vgi_json_of_whole(to, e), e);
+        }
+    }
+    return r;
+}
+
 /* The node keeps its number and mesh, so that vertices keep their order; all else goes to a new node above it. */
 static int put_above(vgi_json *doc, const vgi_gltf_grid *g, vg_err *e)
 {
@@ -166,6 +183,7 @@ static int put_above(vgi_json *doc, const vgi_gltf_grid *g, vg_err *e)
     int r = replace_in(doc, "scenes", "nodes", g->node, above, e);
     if (r == VG_OK) r = replace_in(doc, "nodes", "children", g->node, above, e);
     if (r == VG_OK) r = replace_in(doc, "skins", "joints", g->node, above, e);
+    if (r == VG_OK) r = aim_animations(doc, g->node, above, e);
     vgi_json *copy = r == VG_OK ? vgi_json_copy(node, e) : NULL;
     if (!copy) return r < 0 ? r : VG_ENOMEM;
     vgi_json_drop(copy, "mesh");

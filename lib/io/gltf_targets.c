@@ -58,6 +58,7 @@ static void share_grids(vgi_gltf_writing *w)
     vgi_gltf_morphs *x = w->own;
     for (size_t i = 0; i < x->nlists; i++) {
         const vgi_gltf_part *p = w->character ? &w->character->scene.parts[i] : NULL;
+        if (p && w->whole && p->ntargets) continue; /* its own targets stay as they are, and so does its base */
         if (!p || i == 0 || p->node != p[-1].node) {
             vgi_gltf_grid *g = &x->grids[x->ngrids++];
             if (p) g->node = p->node, g->skinned = p->skin != VGI_GLTF_NONE, g->skin = g->skinned ? (size_t)p->skin : 0;
@@ -76,7 +77,7 @@ static int find_grids(vgi_gltf_writing *w, vg_err *e)
     vgi_gltf_morphs *x = w->own;
     int r = VG_OK;
     for (size_t i = 0; i < x->nlists; i++)
-        vgi_gltf_grid_base(grid_of(x, i), x->base[VGI_GLTF_POSITIONS] + 3 * x->lists[i].first, x->lists[i].count);
+        if (x->lists[i].grid) vgi_gltf_grid_base(grid_of(x, i), x->base[VGI_GLTF_POSITIONS] + 3 * x->lists[i].first, x->lists[i].count);
     for (size_t t = 0; t < x->targets && r == VG_OK; t++) {
         r = vgi_gltf_load_target(w, t, e);
         for (size_t i = 0; i < x->nlists && r == VG_OK; i++)
@@ -97,6 +98,7 @@ static int round_the_base(vgi_gltf_writing *w, vg_err *e)
     }
     for (size_t i = 0; i < x->nlists; i++) {
         const vgi_gltf_list *l = &x->lists[i];
+        if (!l->grid) continue;
         vgi_gltf_round_positions(l->grid, true, x->rounded[VGI_GLTF_POSITIONS] + 3 * l->first, l->count, x->off[0] + 3 * l->first);
         if (l->normals) vgi_gltf_round_normals(x->rounded[VGI_GLTF_NORMALS] + 3 * l->first, l->count);
         x->base_off = fmax(x->base_off, longest_off(w, l, x->off[0], NULL));
@@ -113,10 +115,10 @@ int vgi_gltf_quantize(vgi_gltf_writing *w, vg_err *e)
     x->target_off = vgi_array(x->targets + 1, sizeof *x->target_off, e);
     if (!x->grids || !x->off[0] || !x->off[1] || !x->target_off) return VG_ENOMEM;
     x->based = false;
-    if (w->character) w->character->touches = true; /* rounding may bring vertices together that are not one */
     share_grids(w);
     int r = find_grids(w, e);
-    return r < 0 ? r : round_the_base(w, e);
+    if (r == VG_OK) r = round_the_base(w, e);
+    return r == VG_OK && w->character ? vgi_gltf_find_touches(w->character, x->base[VGI_GLTF_POSITIONS], e) : r;
 }
 
 /* The target at work; the error of a frame that it is by itself is that of both. */
@@ -228,12 +230,19 @@ static vgi_gltf_numbers kind_of_base(const vgi_gltf_list *l, int sort)
     return !l->grid ? VGI_GLTF_FLOATS : sort == VGI_GLTF_POSITIONS ? VGI_GLTF_SHORTS : VGI_GLTF_BYTES;
 }
 
+/* Whether the base of this list is written; else it is that of the character's file. */
+static bool has_base(const vgi_gltf_morphs *x, const vgi_gltf_list *l)
+{
+    return !x->based && (l->grid || !x->grids);
+}
+
 static int describe_base(vgi_gltf_writing *w, places *at, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
     int r = VG_OK;
-    for (size_t i = 0; i < x->nlists && r == VG_OK && !x->based; i++) {
+    for (size_t i = 0; i < x->nlists && r == VG_OK; i++) {
         vgi_gltf_list *l = &x->lists[i];
+        if (!has_base(x, l)) continue;
         for (int s = 0; s < sorts_of(l) && r == VG_OK; s++) {
             double bounds[6];
             vgi_gltf_bounds(x->base[s] + 3 * l->first, l->count, bounds);
@@ -267,7 +276,7 @@ static size_t whole_bytes(const vgi_gltf_morphs *x, vgi_gltf_numbers kind)
     size_t points = 0;
     for (size_t i = 0; i < x->nlists; i++)
         for (int s = 0; s < sorts_of(&x->lists[i]); s++) {
-            if (!x->based && kind_of_base(&x->lists[i], s) == kind) points += x->lists[i].count;
+            if (has_base(x, &x->lists[i]) && kind_of_base(&x->lists[i], s) == kind) points += x->lists[i].count;
             for (size_t t = 0; t < x->targets; t++)
                 if (!vgi_gltf_lying(x, t, i, s)->sparse && vgi_gltf_lying(x, t, i, s)->kind == kind) points += x->lists[i].count;
         }
@@ -380,8 +389,8 @@ static int emit_base(vgi_gltf_writing *w, int kind, vg_err *e)
 {
     const vgi_gltf_morphs *x = w->own;
     int r = VG_OK;
-    for (size_t i = 0; i < x->nlists && r == VG_OK && !x->based; i++)
-        for (int s = 0; s < sorts_of(&x->lists[i]) && r == VG_OK; s++)
+    for (size_t i = 0; i < x->nlists && r == VG_OK; i++)
+        for (int s = 0; s < sorts_of(&x->lists[i]) && r == VG_OK && has_base(x, &x->lists[i]); s++)
             if ((int)kind_of_base(&x->lists[i], s) == kind)
                 r = vgi_gltf_emit_points(w, kind_of_base(&x->lists[i], s), x->base[s] + 3 * x->lists[i].first,
                                          x->lists[i].count, true, e);

@@ -72,10 +72,30 @@ static int open_character(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
+/* Animations by paths of text, which the nodes of quantized meshes would change. */
+static bool has_pointers(const vgi_json *doc)
+{
+    const vgi_json *used = vgi_json_get(doc, "extensionsUsed");
+    for (size_t i = 0; i < vgi_json_count(used); i++) {
+        const char *name = vgi_json_text(vgi_json_at(used, i));
+        if (name && !strcmp(name, "KHR_animation_pointer")) return true;
+    }
+    return false;
+}
+
+/* Whether most vertices have morph targets, which are rounded only if all frames become some. */
+static bool has_many_targets(const vgi_gltf_scene *x)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < x->nparts; i++) n += x->parts[i].ntargets ? x->parts[i].count : 0;
+    return 2 * n > x->all;
+}
+
 /* Where nothing asks for morph targets, the animations of the character's own file are kept if they show the frames. */
 static int open_whole(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 {
-    if (!w->character || o->quantize || o->most_targets || o->morph_tolerance > 0) return VG_OK;
+    if (!w->character || o->most_targets || o->morph_tolerance > 0) return VG_OK;
+    if (o->quantize && (has_many_targets(&w->character->scene) || has_pointers(w->character->scene.g.json))) return VG_OK;
     if (!(w->whole = vgi_array(1, sizeof *w->whole, e))) return VG_ENOMEM;
     return vgi_gltf_whole_open(w->whole, w->character, &w->h->body, e);
 }
@@ -92,8 +112,9 @@ static void decide_whole(vgi_gltf_writing *w)
 {
     const bool fits = w->whole && vgi_gltf_whole_end(w->whole);
     const bool moves = fits && w->whole->content == VGI_GLTF_CLIPS;
-    if (!fits || (moves && (w->shapes || (w->clip && vgi_gltf_whole_clips(w->whole) > 1)))) close_whole(w);
+    if (!fits || (w->quantized && w->whole->content == VGI_GLTF_SHAPES) || (moves && (w->shapes || (w->clip && vgi_gltf_whole_clips(w->whole) > 1)))) close_whole(w);
     if (w->whole) w->still = true, w->times_lost = false;
+    w->as_it_was = w->whole && !w->quantized;
 }
 
 /* The vertices of the file, and their normals; a character has its own. */
@@ -344,10 +365,15 @@ static int describe_file(vgi_gltf_writing *w, vg_err *e)
 
 static int say_all(vgi_gltf_writing *w, vg_err *e)
 {
-    int r = w->character ? vgi_gltf_say_cast_asset(w, e)
+    int r = describe_file(w, e);
+    vg_bytes members = w->json;
+    w->json = (vg_bytes){0};
+    if (r == VG_OK)
+        r = w->character ? vgi_gltf_say_cast_asset(w, e)
                          : vgi_gltf_say(&w->json, e,
                                         "{\"asset\":{\"version\":\"2.0\",\"generator\":\"vg " VG_VERSION "\"},\n");
-    if (r == VG_OK) r = describe_file(w, e);
+    if (r == VG_OK) r = vgi_bytes_append(&w->json, members.data, members.size, e);
+    vg_bytes_clear(&members);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\n\"accessors\":[");
     if (r == VG_OK) r = vgi_bytes_append(&w->json, w->accessors.data, w->accessors.size, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "],\n\"bufferViews\":[");

@@ -79,6 +79,7 @@ struct vgi_gltf_writing {
     vgi_gltf_character *character; /* its nodes, materials and attributes are written; NULL: none */
     bool quantized;
     vgi_gltf_whole *whole;     /* the character's own animations or shapes, as long as they may be those of the frames; or NULL */
+    bool as_it_was;            /* known at the end: its whole document is written; with whole alone, its animations */
     vg_bytes asset;            /* what of its bytes is written */
     vgi_gltf library;          /* of materials, without meshes; json NULL: none */
     vgi_name_set materials;    /* names of those written */
@@ -120,6 +121,7 @@ typedef struct vgi_gltf_cast {
     size_t (*target)(const void *context, size_t t, size_t l);
     const void *context;
     const vgi_json *names;
+    bool own_targets;   /* those that the file has, and their weights, stay */
     bool shapes;        /* targets are shapes, with the default weights of those that the file has */
     const vgi_gltf_grid *grids;
     size_t ngrids;
