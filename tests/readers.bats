@@ -283,6 +283,36 @@ END
     shows 'frames     2'
 }
 
+@test "BVH: positions of joints that are no roots replace their OFFSETs, or are added to them: the first row tells" {
+    local plain='3 Zrotation Xrotation Yrotation' full='6 Xposition Yposition Zposition Zrotation Xrotation Yrotation'
+    arm() { # CHANNELS ROW...: two bones
+        printf 'HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS %s\nJOINT b\n{\nOFFSET 0 4 0\nCHANNELS %s\nJOINT c\n{\nOFFSET 0 3 1\nCHANNELS %s\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n}\n}\nMOTION\nFrames: %d\nFrame Time: 1\n' \
+            "$full" "$1" "$1" $(($# - 1))
+        printf '%s\n' "${@:2}"
+    }
+    arm "$plain" '1 2 3 10 20 30 40 50 60 5 6 7' '1 2 3 0 0 0 0 90 0 0 0 0' >truth.bvh
+    must vg-encode truth.bvh -o truth.vgs
+    # as Blender writes them
+    arm "$full" '1 2 3 10 20 30 0 4 0 40 50 60 0 3 1 5 6 7' '1 2 3 0 0 0 0 4 0 0 90 0 0 3 1 0 0 0' >replaced.bvh
+    must vg-encode replaced.bvh -o out.vgs
+    must vg-diff -t 1e-12 truth.vgs out.vgs
+    # as MakeHuman's poses have them
+    arm "$full" '1 2 3 10 20 30 0 0 0 40 50 60 0 0 0 5 6 7' '1 2 3 0 0 0 0 0 0 0 90 0 0 0 0 0 0 0' >added.bvh
+    must_warn vg-encode added.bvh -o out.vgs
+    one_line
+    says "'added.bvh': positions of joints are near 0, not near their OFFSETs: they are added to them"
+    must vg-diff -t 1e-12 truth.vgs out.vgs
+    # and what moves a joint stays
+    arm "$full" '1 2 3 0 0 0 0 .5 0 0 0 0 0 0 0 0 0 0' >moved.bvh
+    must_warn vg-encode moved.bvh -o out.vgs
+    pipe 'vg-decode -q --format ply-ascii -o - out.vgs | sed "1,/end_header/d" | head -4 | tr "\n" ,'
+    [ "$output" = '1 2 3,1 6.5 3,1 9.5 4,1 10.5 4,' ] || fail "$output"
+    # written again, they replace
+    must vg-decode -q -o again.bvh out.vgs
+    must vg-encode again.bvh -o again.vgs
+    must vg-diff -t 1e-6 out.vgs again.vgs
+}
+
 @test "text with the marks of UTF-8 and UTF-16, joined lines, tabs, every line end" {
     local triangle=$'0 0 0\n1 0 0\n0 1 0\n3 0 1 2' name
     printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >plain.obj

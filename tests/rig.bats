@@ -541,6 +541,23 @@ for bone in "LeftToeBase", "LeftFoot":
 END
 }
 
+@test "poses of MakeHuman, with z up and positions added to OFFSETs, on the body and the rig they were made for" {
+    [ -n "${VG_DATA-}" ] || skip 'VG_DATA does not name the kit'
+    tar -xzf "$VG_DATA/human/human-man-poses.tar.gz"
+    tar -xzf "$VG_DATA/mocap/makehuman-poses.tar.gz"
+    must vg-fitmap -q --skeleton "$VG_DATA/skeletons/human-man-poses.bvh" human-man-poses/ -o man.rig
+    local pose body n=0
+    for body in human-man-poses/*.obj; do # those that stand, sit, bend and fly
+        pose=makehuman-poses/$(sed 's/.*_//; s/\.obj$//' <<<"$body").bvh
+        [ -e "$pose" ] || continue
+        must_warn vg-play man.rig "$pose" -o out.vgs
+        says 'rests with z up' 'its motion is turned upright'
+        must vg-diff -c --of mean -t 0.0005 "$body" out.vgs
+        n=$((n + 1))
+    done
+    [ $n = 14 ]
+}
+
 @test "another body takes the rig: the heavy man driven by a skeleton's motion" {
     made
     must vg-retarget --onto "$DATA/human-heavy-poses.tar.xz" man.rig -o heavy.rig

@@ -36,6 +36,7 @@ typedef struct reading {
     size_t scaled;       /* number of joints with scales */
     size_t channels;     /* values of a row without scales */
     bool still;          /* no motion: one frame at rest */
+    bool added;          /* positions of joints that are no roots are added to their OFFSETs */
     uint64_t frames, next;
     double frame_time;
     double *values, *turns;
@@ -412,20 +413,6 @@ static int fill_head(reading *b, vg_head *h, vg_err *e)
     return check_places(b, h->body.reference, "in the reference pose", e);
 }
 
-static int open_bvh(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
-                    vg_err *e)
-{
-    (void)how;
-    reading *b = *state = vgi_array(1, sizeof *b, e);
-    if (!b) return VG_ENOMEM;
-    b->subject = subject;
-    int r = open_text(b, in, e);
-    if (r < 0) return r;
-    b->values = vgi_array(b->channels, sizeof *b->values, e);
-    b->turns = vgi_array(b->skeleton.njoints, 4 * sizeof *b->turns, e);
-    return b->values && b->turns ? fill_head(b, h, e) : VG_ENOMEM;
-}
-
 /* All frames were read: only blanks may follow. */
 static int end_motion(reading *b, vg_err *e)
 {
@@ -450,6 +437,55 @@ static int read_row(reading *b, vg_err *e)
     return VG_OK;
 }
 
+/* Adds OFFSETs to the positions of joints that are no roots. Returns their number; sum: the absolute values of these positions as
+ * they were, and of what differs from OFFSET. */
+static size_t add_offsets(const vg_skeleton *s, double *values, double sum[2])
+{
+    size_t n = 0;
+    for (size_t j = 0; j < s->njoints; values += s->joints[j++].nchannels) {
+        const vg_joint *joint = &s->joints[j];
+        for (uint32_t i = 0; joint->parent != NONE && i < joint->nchannels; i++) {
+            if (joint->channels[i] > 3) continue;
+            double offset = joint->offset[joint->channels[i] - 1];
+            sum[0] += fabs(values[i]), sum[1] += fabs(values[i] - offset);
+            values[i] += offset;
+            n++;
+        }
+    }
+    return n;
+}
+
+/* Programs differ: positions of joints that are no roots replace their OFFSETs, or are added to them. Those of the first row tell:
+ * they are near OFFSET, or near 0. */
+static int find_added(reading *b, vg_err *e)
+{
+    const char *start = b->at;
+    double sum[2] = {0, 0};
+    if (!b->frames) return VG_OK;
+    int r = read_row(b, e);
+    size_t n = r == VG_OK ? add_offsets(&b->skeleton, b->values, sum) : 0;
+    b->at = start;
+    b->added = n && sum[0] < 0.5 * sum[1];
+    if (b->added) vgi_note(&b->note, "positions of joints are near 0, not near their OFFSETs: they are added to them");
+    return r;
+}
+
+static int open_bvh(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                    vg_err *e)
+{
+    (void)how;
+    reading *b = *state = vgi_array(1, sizeof *b, e);
+    if (!b) return VG_ENOMEM;
+    b->subject = subject;
+    int r = open_text(b, in, e);
+    if (r < 0) return r;
+    b->values = vgi_array(b->channels, sizeof *b->values, e);
+    b->turns = vgi_array(b->skeleton.njoints, 4 * sizeof *b->turns, e);
+    if (!b->values || !b->turns) return VG_ENOMEM;
+    r = fill_head(b, h, e);
+    return r < 0 || b->still ? r : find_added(b, e);
+}
+
 static int next_frame(void *state, vg_frame *f, vg_err *e)
 {
     reading *b = state;
@@ -457,6 +493,7 @@ static int next_frame(void *state, vg_frame *f, vg_err *e)
     if (b->next == b->frames) return end_motion(b, e);
     int r = b->still ? VG_OK : read_row(b, e);
     if (r < 0) return r;
+    if (b->added) add_offsets(&b->skeleton, b->values, (double[2]){0, 0});
     vg_skeleton_pose(&b->skeleton, b->still ? NULL : b->values, f->values, b->turns);
     snprintf(what, sizeof what, "in frame %llu", (unsigned long long)b->next);
     r = check_places(b, f->values, what, e);

@@ -11,7 +11,7 @@ static const uint32_t NONE = UINT32_MAX;
 static const double FIRM = 0.8;  /* least cosine of a direction with its axis, at rest */
 static const double LOOSE = 0.6; /* and in motion */
 static const double STANDS[2] = {0.6, 1.4}; /* the hips of who stands are this high above the ground, in legs */
-static const double LIES[2] = {0.02, 0.4};  /* and of who lies */
+static const double LIES = 0.4;             /* those of who lies are nearer to it */
 
 /* From the right joint of a part to the left one. */
 static bool find_left(const vg_skeleton *s, const vgi_role *roles, const double *at, vgi_part part, double left[3])
@@ -125,33 +125,36 @@ void vgi_rests_stand(vgi_rests *x, const double *at, vgi_stance *stance)
 
 /* ---- in motion ---- */
 
-/* The height of the hips along an axis, in legs, above a ground at 0. */
-static double hips_along(const vgi_stance *s, const double *positions, int axis)
+/* Torso: from the hips to the head. Legs: from the feet to the hips. */
+static void find_posture(const vgi_stance *s, const double *positions, double hips[3], double torso[3], double legs[3])
 {
-    double hips[3], up[3];
-    axis_vector(axis, up);
+    double feet[3];
     vgi_mix(positions + 3 * s->hips[0], positions + 3 * s->hips[1], 0.5, hips);
-    return vgi_dot(hips, up) / s->leg;
+    vgi_mix(positions + 3 * s->below[0], positions + 3 * s->below[1], 0.5, feet);
+    vgi_subtract(positions + 3 * s->top, hips, torso);
+    vgi_subtract(hips, feet, legs);
 }
 
-static bool is_within(double x, const double range[2])
+static double along(const double x[3], int axis)
 {
-    return x > range[0] && x < range[1];
+    double up[3];
+    axis_vector(axis, up);
+    return vgi_dot(x, up);
 }
 
-/* A body that is stretched along another axis than at rest either lies or has been turned by its root. It has been turned if its
- * hips are as high along this axis as those of who stands; if it is the axis that the rig has up, also if they are not as low
- * along the other one as those of who lies. */
+/* A body whose torso is along another axis than at rest either bends or lies, or its root has turned it. If the legs are still
+ * along the axis, it bends. Otherwise the root has turned it if the hips are as high above 0 along the new axis as those of who
+ * stands; for the axis that is up for the rig it is enough that they are not as low along the old one as those of who lies, or
+ * that the file does not move the hips at all. */
 void vgi_stance_look(vgi_stance *s, const double *positions)
 {
-    double feet[3], up[3];
+    double hips[3], torso[3], legs[3];
     if (!s->theirs || !(s->leg > 0) || s->top == NONE || s->below[0] == NONE || s->below[1] == NONE) return;
-    vgi_mix(positions + 3 * s->below[0], positions + 3 * s->below[1], 0.5, feet);
-    vgi_subtract(positions + 3 * s->top, feet, up);
-    int axis = nearest_axis(up, LOOSE);
-    if (!axis || axis == s->theirs) return;
-    bool stands = is_within(hips_along(s, positions, axis), STANDS);
-    bool lies = is_within(hips_along(s, positions, s->theirs), LIES);
+    find_posture(s, positions, hips, torso, legs);
+    int axis = nearest_axis(torso, LOOSE);
+    if (!axis || axis == s->theirs || nearest_axis(legs, LOOSE) == s->theirs) return;
+    double high = along(hips, axis) / s->leg, low = fabs(along(hips, s->theirs)) / s->leg;
+    bool stands = high > STANDS[0] && high < STANDS[1], lies = low < LIES && vgi_length(hips) > 1e-3 * s->leg;
     if (!stands && (axis != s->ours || lies)) return;
     s->moves = axis;
     turn_up(axis, s->ours, s->world);
