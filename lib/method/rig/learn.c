@@ -36,17 +36,18 @@ void vgi_learning_clear(vgi_learning *l)
     for (size_t i = 0; l->poses && i < l->n; i++) free(l->poses[i]);
     free(l->poses);
     free(l->left);
+    vgi_rig_sums_clear(&l->sums);
     l->rig.skin_bone = NULL, l->rig.skin_weight = NULL, l->reference = NULL, l->poses = NULL, l->left = NULL;
 }
 
 int vgi_learning_weights(vgi_learning *l, double *miss, vg_err *e)
 {
-    vgi_rig_sums s = {0};
-    int r = vgi_rig_sums_make(&s, l->nv, l->rig.nbones, l->at, NULL, e);
-    if (r == VG_OK)
-        vgi_rig_sums_add(&s, l->n, (const double *const *)l->poses, (const double *const *)l->transforms, l->threads);
-    if (r == VG_OK) r = vgi_skin_fit(&l->rig, &s, l->reference, l->threads, l->left, e);
-    vgi_rig_sums_clear(&s);
+    vgi_rig_sums *s = &l->sums;
+    int r = s->nv ? VG_OK : vgi_rig_sums_make(s, l->nv, l->rig.nbones, l->at, NULL, e);
+    if (r < 0) return r;
+    vgi_rig_sums_restart(s);
+    vgi_rig_sums_add(s, l->n, (const double *const *)l->poses, (const double *const *)l->transforms, l->threads);
+    r = vgi_skin_fit(&l->rig, s, l->reference, l->threads, l->left, e);
     if (r == VG_OK) *miss = vgi_mean(l->left, l->nv);
     return r;
 }

@@ -4,7 +4,7 @@
 #ifndef VG_LEARN_H
 #define VG_LEARN_H
 
-#include "core/core.h"
+#include "method/rig/rig_sums.h"
 
 typedef struct vgi_learning {
     vg_rig rig;           /* owns its skin, borrows the rest */
@@ -15,6 +15,7 @@ typedef struct vgi_learning {
     double *at;           /* 3 per bone; borrowed */
     double *left;         /* nv: root mean square error of skinning */
     int threads;
+    vgi_rig_sums sums;    /* kept from round to round */
 } vgi_learning;
 
 /* vgi_learning_gather: take at most `most` vertices of the reference and the poses, evenly strided. */

@@ -45,8 +45,14 @@ void vgi_rig_sums_clear(vgi_rig_sums *s)
     *s = (vgi_rig_sums){0};
 }
 
+void vgi_rig_sums_restart(vgi_rig_sums *s)
+{
+    s->poses = 0;
+}
+
 typedef struct adding {
     vgi_rig_sums *s;
+    double kept; /* 0 for the first poses: sums are written, not read; otherwise 1 */
     size_t count;
     const double *const *poses;
 } adding;
@@ -81,9 +87,10 @@ static void add_vertices(void *context, size_t task)
                 double d = a->poses[k][3 * (first + v) + c] - s->origin[k][c];
                 y[v * width + 3 * k + c] = d, sum += d * d;
             }
-        s->square[first + v] += sum;
+        s->square[first + v] = a->kept * s->square[first + v] + sum;
     }
-    vgi_product_add(rows, 4 * s->n, width, y, width, s->motions, 4 * s->n, s->pull + first * 4 * s->n, 4 * s->n);
+    vgi_gemm_double(false, false, rows, 4 * s->n, width, y, width, s->motions, 4 * s->n, a->kept, s->pull + first * 4 * s->n,
+                    4 * s->n);
 }
 
 static void add_faces(void *context, size_t task)
@@ -104,8 +111,8 @@ static void add_faces(void *context, size_t task)
                     for (size_t q = 0; q < 3; q++) f[(3 * i + q) * width + 3 * (k + l) + c] = turn[3 * c + q][l];
         }
     }
-    vgi_product_add(3 * faces, 3 * s->n, width, f, width, s->turned, 3 * s->n, s->turn + 3 * first * 3 * s->n,
-                    3 * s->n);
+    vgi_gemm_double(false, false, 3 * faces, 3 * s->n, width, f, width, s->turned, 3 * s->n, a->kept,
+                    s->turn + 3 * first * 3 * s->n, 3 * s->n);
 }
 
 static void add_cross(void *context, size_t task)
@@ -113,7 +120,7 @@ static void add_cross(void *context, size_t task)
     const adding *a = context;
     vgi_rig_sums *s = a->s;
     size_t first = task * ROWS, rows = 4 * s->n - first < ROWS ? 4 * s->n - first : ROWS, width = 3 * a->count;
-    vgi_product_add(rows, 4 * s->n, width, s->transposed + first * width, width, s->motions, 4 * s->n,
+    vgi_gemm_double(false, false, rows, 4 * s->n, width, s->transposed + first * width, width, s->motions, 4 * s->n, a->kept,
                     s->cross + first * 4 * s->n, 4 * s->n);
 }
 
@@ -122,7 +129,7 @@ void vgi_rig_sums_add(vgi_rig_sums *s, size_t count, const double *const *poses,
 {
     vgi_blas_alone();
     for (size_t first = 0; first < count; first += BLOCK) {
-        adding a = {s, count - first < BLOCK ? count - first : BLOCK, poses + first};
+        adding a = {s, s->poses ? 1 : 0, count - first < BLOCK ? count - first : BLOCK, poses + first};
         for (size_t k = 0; k < a.count; k++) {
             vg_centroid(a.poses[k], s->nv, s->origin[k]);
             place_motions(s, k, transforms[first + k]);

@@ -27,6 +27,8 @@ typedef struct vgi_rig_sums {
 int vgi_rig_sums_make(vgi_rig_sums *s, size_t nv, size_t n, const double *at, const vgi_turns *turns,
                       vg_err *e) VG_MUST_CHECK;
 void vgi_rig_sums_clear(vgi_rig_sums *s);
+/* vgi_rig_sums_restart: forget all poses: the next ones that are added are the first. */
+void vgi_rig_sums_restart(vgi_rig_sums *s);
 /* vgi_rig_sums_add: any number of poses (nv points) with their transforms (7 n numbers). */
 void vgi_rig_sums_add(vgi_rig_sums *s, size_t count, const double *const *poses, const double *const *transforms,
                       int threads);

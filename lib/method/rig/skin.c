@@ -19,15 +19,27 @@ enum { CHUNK = 64, MOST = 20, BEST = 14 }; /* candidate bones per vertex; of the
 typedef struct bones {
     const vg_rig *r;
     size_t nsegments;
-    uint32_t *of; /* bone of each segment */
-    double *from, *to;
+    uint32_t *of;   /* bone of each segment */
+    double *from;   /* 3 numbers: where a segment begins */
+    double *along;  /* 4: to its end, and 1 over its squared length, or 0 */
 } bones;
 
 static void clear_bones(bones *b)
 {
     free(b->of);
     free(b->from);
-    free(b->to);
+    free(b->along);
+}
+
+static void add_segment(bones *b, uint32_t bone, const double from[3], const double to[3])
+{
+    size_t i = b->nsegments++;
+    double *d = b->along + 4 * i, length;
+    b->of[i] = bone;
+    memcpy(b->from + 3 * i, from, 3 * sizeof *from);
+    vgi_subtract(to, from, d);
+    length = vgi_dot(d, d);
+    d[3] = length > 0 ? 1 / length : 0;
 }
 
 static int make_bones(bones *b, const vg_rig *g, vg_err *e)
@@ -36,8 +48,8 @@ static int make_bones(bones *b, const vg_rig *g, vg_err *e)
     uint32_t *mover = vgi_array(joints, sizeof *mover, e);
     *b = (bones){.r = g};
     b->of = vgi_array(2 * joints, sizeof *b->of, e);
-    b->from = vgi_array(2 * joints, 3 * sizeof *b->from, e), b->to = vgi_array(2 * joints, 3 * sizeof *b->to, e);
-    if (!mover || !b->of || !b->from || !b->to) {
+    b->from = vgi_array(2 * joints, 3 * sizeof *b->from, e), b->along = vgi_array(2 * joints, 4 * sizeof *b->along, e);
+    if (!mover || !b->of || !b->from || !b->along) {
         free(mover);
         clear_bones(b);
         return VG_ENOMEM;
@@ -48,22 +60,20 @@ static int make_bones(bones *b, const vg_rig *g, vg_err *e)
         for (int own = 0; own < 2; own++) {
             uint32_t from = own ? (uint32_t)j : parent, bone = from == UINT32_MAX ? UINT32_MAX : mover[from];
             if (bone == UINT32_MAX) continue;
-            size_t i = b->nsegments++;
-            b->of[i] = bone;
-            memcpy(b->from + 3 * i, g->at + 3 * (size_t)from, 3 * sizeof(double));
-            memcpy(b->to + 3 * i, g->at + 3 * j, 3 * sizeof(double));
+            add_segment(b, bone, g->at + 3 * (size_t)from, g->at + 3 * j);
         }
     }
     free(mover);
     return VG_OK;
 }
 
-static double squared_distance(const double a[3], const double b[3], const double x[3])
+/* Squared distance of x from a segment: where it begins, and `along` as in bones. */
+static double squared_distance(const double from[3], const double *along, const double x[3])
 {
-    double d[3], y[3];
-    vgi_subtract(b, a, d), vgi_subtract(x, a, y);
-    double length = vgi_dot(d, d), t = length > 0 ? vgi_dot(d, y) / length : 0;
-    vgi_add_scaled(y, -(t < 0 ? 0 : t > 1 ? 1 : t), d);
+    double y[3];
+    vgi_subtract(x, from, y);
+    double t = vgi_dot(along, y) * along[3];
+    vgi_add_scaled(y, -(t < 0 ? 0 : t > 1 ? 1 : t), along);
     return vgi_dot(y, y);
 }
 
@@ -72,7 +82,7 @@ static void distances(const bones *b, const double x[3], double *far)
 {
     for (size_t j = 0; j < b->r->nbones; j++) far[j] = INFINITY;
     for (size_t i = 0; i < b->nsegments; i++) {
-        double d = squared_distance(b->from + 3 * i, b->to + 3 * i, x), *to = &far[b->of[i]];
+        double d = squared_distance(b->from + 3 * i, b->along + 4 * i, x), *to = &far[b->of[i]];
         if (d < *to) *to = d;
     }
 }
