@@ -329,6 +329,11 @@ END
     printf 'time 2 1\n' >edits.txt
     must_fail 3 vg-sample --edit edits.txt "$(trex signal)" -o out.vgs
     [ ! -e out.vgs ]
+    # the points of a curve are no edits: the message says where they belong
+    must vg-info --curve "$(trex signal)"
+    printf '%s\n' "$output" >points.txt
+    must_fail 3 vg-sample --edit points.txt "$(trex signal)" -o out.vgs
+    says "points.txt' line 2: an edit begins with control" "for 'vg-sample --curve'"
 }
 
 @test "names with quotes, tabs, line ends and letters of other languages go through edits and retimings" {

@@ -152,6 +152,17 @@ static size_t next_word(const char **p, const char **word)
     return n;
 }
 
+static int refuse_verb(const editing *x, const char *word, size_t n, vg_err *e)
+{
+    char *end;
+    strtod(word, &end);
+    if (end == word + n)
+        return vg_fail(e, VG_EINPUT, "%s: an edit begins with control, insert, remove, frame, site or time, not with a number; points of "
+                       "a curve, as 'vg-info --curve' prints them, are for 'vg-sample --curve'", x->where);
+    return vg_fail(e, VG_EINPUT, "%s: '%.*s' is not known: control, insert, remove, frame, site or time", x->where,
+                   (int)(n < 40 ? n : 40), word);
+}
+
 static int apply_line(editing *x, const char *line, vg_err *e)
 {
     const char *word;
@@ -160,9 +171,7 @@ static int apply_line(editing *x, const char *line, vg_err *e)
     const struct verb *v = NULL;
     for (size_t i = 0; i < sizeof verbs / sizeof *verbs && !v; i++)
         if (strlen(verbs[i].name) == n && !memcmp(verbs[i].name, word, n)) v = &verbs[i];
-    if (!v)
-        return vg_fail(e, VG_EINPUT, "%s: '%.*s' is not known: control, insert, remove, frame, site or time", x->where,
-                       (int)(n < 40 ? n : 40), word);
+    if (!v) return refuse_verb(x, word, n, e);
     double number[3];
     for (int i = 0; i < v->numbers; i++) {
         char *end;
