@@ -117,19 +117,24 @@ int vgi_skin_near(vg_rig *g, size_t nv, const double *reference, vg_err *e)
 
 /* ---- the quadratic of one vertex ---- */
 
-typedef struct quadratic {
-    size_t n;
-    uint32_t bone[MOST];
-    double g[MOST][MOST], b[MOST];
-    double ridge; /* ridge on all weights except that of the last bone chosen */
-} quadratic;
-
 /* Up to four bones of a quadratic. */
 typedef struct choice {
     size_t n;
     size_t at[VG_SKIN];
     double w[VG_SKIN], value;
 } choice;
+
+typedef struct quadratic {
+    const struct skinning *x;
+    const double *at; /* the vertex */
+    size_t n;
+    uint32_t bone[MOST];
+    double g[MOST][MOST], b[MOST]; /* of g the diagonal, and the rows and columns that are known */
+    bool known[MOST];
+    double ridge; /* ridge on all weights except that of the last bone chosen */
+} quadratic;
+
+static void find_rows(quadratic *q, const choice *c);
 
 /* Solve a x = b for a positive definite a, n <= 3. Returns false, and changes nothing, if a is nearly singular. */
 static bool solve_definite(double a[3][3], double *b, size_t n, double scale)
@@ -249,7 +254,7 @@ static void try_bone(const quadratic *q, const choice *best, size_t k, choice *n
     }
 }
 
-static void choose_bones(const quadratic *q, double least_gain, choice *best)
+static void choose_bones(quadratic *q, double least_gain, choice *best)
 {
     *best = (choice){.n = 1, .w = {1}};
     for (size_t k = 0; k < q->n; k++)
@@ -258,6 +263,7 @@ static void choose_bones(const quadratic *q, double least_gain, choice *best)
     for (int round = 0; round < 2 * VG_SKIN; round++) { /* add or replace a bone */
         choice next = *best;
         double gain[MOST];
+        find_rows(q, best);
         bound_gains(q, best, gain);
         for (;;) {
             size_t k = 0;
@@ -288,22 +294,40 @@ typedef struct skinning {
     const double *reference;
     const bones *b;
     uint32_t *mover; /* per joint */
+    double *own;     /* 16 per bone: the block of the bone itself in the cross sums */
     double *space;   /* per chunk in progress: 3 n */
     double diagonal, *miss;
     size_t chunks;
 } skinning;
 
+/* p' c q for the point v relative to the joints a and b; c: 4 x 4, its rows `width` apart. */
+static double block_product(const double *c, size_t width, const double a[3], const double b[3], const double v[3])
+{
+    const double p[4] = {v[0] - a[0], v[1] - a[1], v[2] - a[2], 1}, q[4] = {v[0] - b[0], v[1] - b[1], v[2] - b[2], 1};
+    double sum = 0;
+    for (size_t k = 0; k < 4; k++, c += width) sum += p[k] * (c[0] * q[0] + c[1] * q[1] + c[2] * q[2] + c[3] * q[3]);
+    return sum;
+}
+
 /* One entry of G: the product of bones i and j at the point. */
 static double bone_product(const skinning *x, size_t i, size_t j, const double *v)
 {
-    size_t width = 4 * x->s->n;
-    const double *a = x->s->at + 3 * i, *b = x->s->at + 3 * j, *c = x->s->cross + 4 * i * width + 4 * j;
-    const double p[4] = {v[0] - a[0], v[1] - a[1], v[2] - a[2], 1}, q[4] = {v[0] - b[0], v[1] - b[1], v[2] - b[2], 1};
-    double sum = 0;
-    for (size_t k = 0; k < 4; k++)
-        sum += p[k] *
-               (c[k * width] * q[0] + c[k * width + 1] * q[1] + c[k * width + 2] * q[2] + c[k * width + 3] * q[3]);
-    return sum;
+    const double *a = x->s->at + 3 * i, *b = x->s->at + 3 * j;
+    if (i == j) return block_product(x->own + 16 * i, 4, a, a, v);
+    return block_product(x->s->cross + 16 * i * x->s->n + 4 * j, 4 * x->s->n, a, b, v);
+}
+
+/* The rows and columns of G for the bones of a choice. */
+static void find_rows(quadratic *q, const choice *c)
+{
+    for (size_t k = 0; k < c->n; k++) {
+        size_t i = c->at[k];
+        if (q->known[i]) continue;
+        q->known[i] = true;
+        for (size_t j = 0; j < q->n; j++)
+            if (j != i && !q->known[j])
+                q->g[i][j] = q->g[j][i] = bone_product(q->x, q->bone[i > j ? i : j], q->bone[i > j ? j : i], q->at);
+    }
 }
 
 static double pull_product(const skinning *x, size_t j, size_t v)
@@ -349,14 +373,14 @@ static void skin_vertex(const skinning *x, size_t v, double *far, double *alone)
     const vgi_rig_sums *s = x->s;
     const double *p = x->reference + 3 * v;
     double poses = (double)s->poses;
-    quadratic q = {.ridge = 0};
+    quadratic q = {.x = x, .at = p};
     choice c;
     distances(x->b, p, far);
     for (size_t j = 0; j < s->n; j++) alone[j] = bone_product(x, j, j, p) - 2 * pull_product(x, j, v) + nearness * poses * far[j];
     find_candidates(x, alone, &q);
     for (size_t i = 0; i < q.n; i++) {
         q.b[i] = pull_product(x, q.bone[i], v) - 0.5 * nearness * poses * far[q.bone[i]];
-        for (size_t j = 0; j <= i; j++) q.g[i][j] = q.g[j][i] = bone_product(x, q.bone[i], q.bone[j], p);
+        q.g[i][i] = bone_product(x, q.bone[i], q.bone[i], p);
     }
     choose_bones(&q, least_gain * poses * x->diagonal * x->diagonal, &c);
     first_last(&c);
@@ -404,14 +428,17 @@ int vgi_skin_fit(vg_rig *g, const vgi_rig_sums *s, const double *reference, int 
                   .chunks = s->nv < CHUNK ? 1 : CHUNK};
     x.mover = vgi_array(g->skeleton.njoints, sizeof *x.mover, e);
     x.space = vgi_array(x.chunks, 2 * s->n * sizeof *x.space, e);
-    if (x.mover && x.space) {
+    x.own = vgi_array(s->n, 16 * sizeof *x.own, e);
+    if (x.mover && x.space && x.own) {
         vgi_rig_movers(g, x.mover);
+        for (size_t i = 0; i < 16 * s->n; i++) x.own[i] = s->cross[(4 * (i / 16) + i % 16 / 4) * 4 * s->n + 4 * (i / 16) + i % 4];
         vgi_parallel(threads, x.chunks, skin_chunk, &x);
     } else {
         r = VG_ENOMEM;
     }
     free(x.mover);
     free(x.space);
+    free(x.own);
     clear_bones(&b);
     return r;
 }
