@@ -147,6 +147,7 @@ static int add_targets(vgi_json *primitive, const vgi_gltf_cast *k, size_t l, vg
         r = vgi_json_add(targets, target, e);
         if (r == VG_OK) r = put_number(target, "POSITION", at, e);
         if (r == VG_OK && k->lists[l].normals) r = put_number(target, "NORMAL", at + 1, e);
+        if (r == VG_OK && k->lists[l].tangents) r = put_number(target, "TANGENT", at + 2, e);
     }
     return r;
 }

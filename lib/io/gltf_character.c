@@ -186,6 +186,48 @@ static int read_normals(vgi_gltf_character *c, vg_err *e)
     return VG_OK;
 }
 
+static bool has_normal_map(const vgi_gltf_scene *x, const vgi_json *primitive)
+{
+    const vgi_json *material;
+    if (vgi_gltf_item(&x->g, vgi_json_get(primitive, "material"), "materials", &material, NULL, NULL) < 0) return false;
+    const vgi_json *clearcoat = vgi_json_get(vgi_json_get(material, "extensions"), "KHR_materials_clearcoat");
+    return vgi_json_get(material, "normalTexture") || vgi_json_get(clearcoat, "clearcoatNormalTexture");
+}
+
+bool vgi_gltf_needs_tangents(const vgi_gltf_scene *x, size_t part)
+{
+    if (!vgi_json_get(x->parts[part].attributes, "TANGENT") || !vgi_json_get(x->parts[part].attributes, "NORMAL")) return false;
+    for (size_t i = 0; i < x->npieces; i++)
+        if (x->pieces[i].part == part && has_normal_map(x, x->pieces[i].json)) return true;
+    return false;
+}
+
+/* Nodes and skins transform tangents by M itself. */
+static int read_tangents(vgi_gltf_character *c, vg_err *e)
+{
+    const vgi_gltf_scene *x = &c->scene;
+    for (size_t i = 0; i < x->nparts; i++) {
+        const vgi_gltf_part *p = &x->parts[i];
+        vgi_accessor a;
+        if (!vgi_gltf_needs_tangents(x, i) ||
+            vgi_gltf_accessor(&x->g, vgi_json_get(p->attributes, "TANGENT"), 4, p->count, "tangents", &a, NULL) < 0)
+            continue;
+        if (!c->tangent && (!(c->tangent = vgi_array(c->n, 3 * sizeof *c->tangent, e)) ||
+                            !(c->world_tangent = vgi_array(c->n, 3 * sizeof *c->world_tangent, e))))
+            return VG_ENOMEM;
+        for (size_t v = 0; v < p->count; v++) {
+            const size_t f = p->first + v;
+            double t[4];
+            vgi_accessor_get(&a, v, t);
+            if (!vgi_finite(t, 3)) continue;
+            for (int k = 0; k < 3; k++) c->tangent[3 * f + k] = (float)t[k];
+            linear(c->out + 12 * f, t, c->world_tangent + 3 * f);
+            vgi_make_unit(c->world_tangent + 3 * f);
+        }
+    }
+    return VG_OK;
+}
+
 /* Lists of the file's vertices that are one vertex of the mesh. */
 static int group_normals(vgi_gltf_character *c, vg_err *e)
 {
@@ -266,27 +308,37 @@ static bool is_still(const double m[9])
     return m[1] == m[3] && m[2] == m[6] && m[5] == m[7] && m[0] >= 0 && m[4] >= 0 && m[8] >= 0;
 }
 
-/* A normal in another pose, in the space of its mesh. */
-static void normal_now(const vgi_gltf_character *c, size_t f, const double m[9], double to[3])
+/* Change of a normal in another pose, in the space of its mesh. */
+static void turn_normal(const vgi_gltf_character *c, size_t f, const double r[9], float to[3])
 {
-    double r[9], turned[3];
-    vgi_fit_rotation(m, r);
+    double turned[3], now[3];
     for (int i = 0; i < 3; i++) turned[i] = vgi_dot(r + 3 * i, c->world_normal + 3 * f);
-    normal_in(c, f, turned, to);
+    normal_in(c, f, turned, now);
+    for (int k = 0; k < 3; k++) to[k] = (float)(now[k] - c->normal[3 * f + k]);
 }
 
-void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *to)
+static void turn_tangent(const vgi_gltf_character *c, size_t f, const double r[9], float to[3])
+{
+    double turned[3], now[3];
+    if (vgi_length(c->world_tangent + 3 * f) == 0) return;
+    for (int i = 0; i < 3; i++) turned[i] = vgi_dot(r + 3 * i, c->world_tangent + 3 * f);
+    linear(c->in + 12 * f, turned, now);
+    vgi_make_unit(now);
+    for (int k = 0; k < 3; k++) to[k] = (float)(now[k] - c->tangent[3 * f + k]);
+}
+
+void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *normals, float *tangents)
 {
     sum_faces(c, world);
+    memset(normals, 0, 3 * c->n * sizeof *normals);
+    if (tangents) memset(tangents, 0, 3 * c->n * sizeof *tangents);
     for (size_t f = 0; f < c->n; f++) {
-        float *d = to + 3 * f;
-        double n[3];
-        memset(d, 0, 3 * sizeof *d);
-        if (c->group[f] == UINT32_MAX) continue;
-        const double *m = c->turn + 9 * (size_t)c->group[f];
-        if (is_still(m)) continue;
-        normal_now(c, f, m, n);
-        for (int k = 0; k < 3; k++) d[k] = (float)(n[k] - c->normal[3 * f + k]);
+        const double *m = c->group[f] == UINT32_MAX ? NULL : c->turn + 9 * (size_t)c->group[f];
+        double r[9];
+        if (!m || is_still(m)) continue;
+        vgi_fit_rotation(m, r);
+        turn_normal(c, f, r, normals + 3 * f);
+        if (tangents) turn_tangent(c, f, r, tangents + 3 * f);
     }
 }
 
@@ -302,7 +354,7 @@ static int turn_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
     }
     if (r == VG_OK) {
         set_rest(c, shown);
-        vgi_gltf_character_turn(c, b->reference, turned);
+        vgi_gltf_character_turn(c, b->reference, turned, NULL);
         for (size_t f = 0; f < c->n; f++) {
             float *n = c->normal + 3 * f;
             for (int k = 0; k < 3; k++) n[k] += turned[3 * f + k];
@@ -317,6 +369,7 @@ static int turn_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 static int find_normals(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 {
     int r = read_normals(c, e);
+    if (r == VG_OK) r = read_tangents(c, e);
     if (r < 0 || !c->normal) return r;
     if ((r = group_normals(c, e)) < 0) return r;
     c->rest = vgi_array(c->faces.mesh.nf, sizeof *c->rest, e), c->turn = vgi_array(c->ngroups, 9 * sizeof *c->turn, e);
@@ -381,7 +434,7 @@ int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 
 void vgi_gltf_character_clear(vgi_gltf_character *c)
 {
-    void *const arrays[] = {c->out, c->in, c->base, c->normal, c->world_normal, c->skinned, c->group, c->rest, c->turn};
+    void *const arrays[] = {c->out, c->in, c->base, c->normal, c->world_normal, c->tangent, c->world_tangent, c->skinned, c->group, c->rest, c->turn};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     vg_mesh_clear(&c->faces.mesh);
     vgi_gltf_scene_clear(&c->scene);

@@ -22,6 +22,8 @@ typedef struct vgi_gltf_character {
     bool *skinned;          /* n */
     float *base, *normal;   /* n x 3: the reference pose and its normals; normal is NULL without any */
     double *world_normal;   /* n x 3 */
+    float *tangent;         /* n x 3; 0 where no normal map needs one; NULL: nowhere */
+    double *world_tangent;  /* n x 3 */
     bool kept;              /* the reference pose is the one shown by the asset */
     bool touches;           /* different vertices coincide in it, and a reader could weld them */
     uint32_t *group;        /* n: vertices that are one and have one normal; UINT32_MAX without a normal */
@@ -40,7 +42,8 @@ int vgi_gltf_find_touches(vgi_gltf_character *c, const float *base, vg_err *e) V
  * for displacements of the mesh (moved). Zero displacements stay zero. */
 void vgi_gltf_character_pose(const vgi_gltf_character *c, const double *world, const float *moved, float *to);
 void vgi_gltf_character_move(const vgi_gltf_character *c, const float *moved, float *to);
-/* vgi_gltf_character_turn: change of the normals in a pose of the mesh. */
-void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *to);
+/* vgi_gltf_character_turn: change of the normals and tangents in a pose of the mesh. tangents: NULL if there are none. */
+void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *normals, float *tangents);
+bool vgi_gltf_needs_tangents(const vgi_gltf_scene *x, size_t part); /* a material has a normal map, and there are tangents */
 
 #endif

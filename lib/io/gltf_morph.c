@@ -125,9 +125,11 @@ static int list_parts(vgi_gltf_writing *w, vg_err *e)
         uint64_t position = 0, normal = 0;
         vgi_json_whole(vgi_json_get(p->attributes, "POSITION"), &position);
         l->normals = c->normal && vgi_json_whole(vgi_json_get(p->attributes, "NORMAL"), &normal);
+        l->tangents = l->normals && c->tangent && vgi_gltf_needs_tangents(&c->scene, i);
         l->first = p->first, l->count = p->count, l->position = (size_t)position, l->normal = (size_t)normal;
     }
     if (c->normal && !(x->file[VGI_GLTF_NORMALS] = vgi_array(x->n, VGI_GLTF_POINT, e))) return VG_ENOMEM;
+    if (c->normal && c->tangent && !(x->file[VGI_GLTF_TANGENTS] = vgi_array(x->n, VGI_GLTF_POINT, e))) return VG_ENOMEM;
     return (x->world = vgi_array(c->nv, 3 * sizeof *x->world, e)) ? VG_OK : VG_ENOMEM;
 }
 
@@ -165,7 +167,7 @@ static void turn_normals(vgi_gltf_writing *w)
 {
     vgi_gltf_morphs *x = w->own;
     if (!x->file[VGI_GLTF_NORMALS]) return;
-    if (w->character) vgi_gltf_character_turn(w->character, x->world, x->file[VGI_GLTF_NORMALS]);
+    if (w->character) vgi_gltf_character_turn(w->character, x->world, x->file[VGI_GLTF_NORMALS], x->file[VGI_GLTF_TANGENTS]);
     else vgi_gltf_normals_turn(&w->normals, x->world, x->file[VGI_GLTF_NORMALS]);
 }
 
@@ -183,27 +185,37 @@ static void spread_basis(vgi_gltf_writing *w, size_t t)
     vgi_gltf_morphs *x = w->own;
     if (w->character) vgi_gltf_character_move(w->character, x->first, x->file[VGI_GLTF_POSITIONS]);
     else spread_plain(w);
-    if (x->file[VGI_GLTF_NORMALS]) memcpy(x->file[VGI_GLTF_NORMALS], x->turned + t * 3 * x->n, VGI_GLTF_POINT * x->n);
+    for (int s = VGI_GLTF_NORMALS; s < VGI_GLTF_SORTS; s++)
+        if (x->file[s]) memcpy(x->file[s], x->turned[s] + t * 3 * x->n, VGI_GLTF_POINT * x->n);
 }
 
 /* ---- normals of a basis: mixed with the weights of the positions, they are nearest to the normals of all frames ---- */
+
+/* solved: the share of the frame in target t is solved[t * step]. */
+static void add_frame(vgi_gltf_morphs *x, int sort, const double *solved, size_t step)
+{
+    for (size_t t = 0; t < x->targets; t++) {
+        const float share = (float)solved[t * step];
+        float *to = x->turned[sort] + t * 3 * x->n;
+        for (size_t i = 0; i < 3 * x->n; i++) to[i] += share * x->file[sort][i];
+    }
+}
 
 static int turn_basis(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
     double *solved = NULL;
     if (x->chosen || !x->file[VGI_GLTF_NORMALS]) return VG_OK;
-    x->turned = vgi_array(x->targets, 3 * sizeof *x->turned * x->n, e);
-    int r = x->turned ? vgi_gltf_basis_solve(&x->basis, w->frames, &solved, e) : VG_ENOMEM;
+    int r = VG_OK;
+    for (int s = VGI_GLTF_NORMALS; s < VGI_GLTF_SORTS && r == VG_OK; s++)
+        if (x->file[s] && !(x->turned[s] = vgi_array(x->targets, VGI_GLTF_POINT * x->n, e))) r = VG_ENOMEM;
+    if (r == VG_OK) r = vgi_gltf_basis_solve(&x->basis, w->frames, &solved, e);
     for (size_t f = 0; f < w->frames && r == VG_OK; f++) {
         if ((r = load_frame(w, f, x->first, e)) < 0) break;
         find_world(w, x->first);
         turn_normals(w);
-        for (size_t t = 0; t < x->targets; t++) {
-            const float share = (float)solved[t * w->frames + f];
-            float *to = x->turned + t * 3 * x->n;
-            for (size_t i = 0; i < 3 * x->n; i++) to[i] += share * x->file[VGI_GLTF_NORMALS][i];
-        }
+        for (int s = VGI_GLTF_NORMALS; s < VGI_GLTF_SORTS; s++)
+            if (x->file[s]) add_frame(x, s, solved + f, w->frames);
     }
     free(solved);
     return r;
@@ -444,7 +456,8 @@ static void release_morphs(void *own)
     if (!x) return;
     vgi_gltf_basis_clear(&x->basis);
     void *const arrays[] = {x->packed, x->chosen, x->at,     x->first, x->lists, x->file[VGI_GLTF_POSITIONS],
-                            x->file[VGI_GLTF_NORMALS], x->world, x->turned,
+                            x->file[VGI_GLTF_NORMALS], x->file[VGI_GLTF_TANGENTS], x->world, x->turned[VGI_GLTF_NORMALS],
+                            x->turned[VGI_GLTF_TANGENTS],
                             x->moving, x->grids, x->rounded[VGI_GLTF_POSITIONS], x->rounded[VGI_GLTF_NORMALS], x->off[0], x->off[1],
                             x->target_off};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);

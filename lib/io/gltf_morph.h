@@ -15,7 +15,8 @@ typedef struct vgi_gltf_laid {
     size_t accessor;
 } vgi_gltf_laid;
 
-enum { VGI_GLTF_POSITIONS, VGI_GLTF_NORMALS, VGI_GLTF_SORTS };
+/* The base has its own tangents, which are never written again. */
+enum { VGI_GLTF_POSITIONS, VGI_GLTF_NORMALS, VGI_GLTF_TANGENTS, VGI_GLTF_SORTS };
 
 typedef struct vgi_gltf_morphs {
     size_t most;
@@ -34,7 +35,7 @@ typedef struct vgi_gltf_morphs {
     float *file[VGI_GLTF_SORTS];    /* of a target: of all vertices of the file */
     float *moving;         /* those of a list that it moves */
     double *world;         /* a pose of the mesh */
-    float *turned;         /* for a basis, the normals of all targets */
+    float *turned[VGI_GLTF_SORTS]; /* for a basis, the normals and tangents of all targets */
     vgi_gltf_laid *at;             /* targets x nlists x VGI_GLTF_SORTS */
     size_t weights;        /* number of their accessor */
     /* with quantize: */

@@ -18,7 +18,12 @@ vgi_gltf_laid *vgi_gltf_lying(const vgi_gltf_morphs *x, size_t t, size_t l, int 
 
 static int sorts_of(const vgi_gltf_list *l)
 {
-    return l->normals ? VGI_GLTF_SORTS : VGI_GLTF_NORMALS;
+    return l->tangents ? VGI_GLTF_SORTS : l->normals ? VGI_GLTF_TANGENTS : VGI_GLTF_NORMALS;
+}
+
+static int sorts_of_base(const vgi_gltf_list *l)
+{
+    return l->normals ? VGI_GLTF_TANGENTS : VGI_GLTF_NORMALS;
 }
 
 static bool moves(const float *d, size_t v)
@@ -91,7 +96,7 @@ static int find_grids(vgi_gltf_writing *w, vg_err *e)
 static int round_the_base(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
-    for (int s = 0; s < (x->base[VGI_GLTF_NORMALS] ? VGI_GLTF_SORTS : VGI_GLTF_NORMALS); s++) {
+    for (int s = 0; s < (x->base[VGI_GLTF_NORMALS] ? VGI_GLTF_TANGENTS : VGI_GLTF_NORMALS); s++) {
         if (!(x->rounded[s] = vgi_array_raw(x->n, VGI_GLTF_POINT, e))) return VG_ENOMEM;
         memcpy(x->rounded[s], x->base[s], VGI_GLTF_POINT * x->n);
         x->exact[s] = x->base[s], x->base[s] = x->rounded[s];
@@ -243,7 +248,7 @@ static int describe_base(vgi_gltf_writing *w, places *at, vg_err *e)
     for (size_t i = 0; i < x->nlists && r == VG_OK; i++) {
         vgi_gltf_list *l = &x->lists[i];
         if (!has_base(x, l)) continue;
-        for (int s = 0; s < sorts_of(l) && r == VG_OK; s++) {
+        for (int s = 0; s < sorts_of_base(l) && r == VG_OK; s++) {
             double bounds[6];
             vgi_gltf_bounds(x->base[s] + 3 * l->first, l->count, bounds);
             *(s == VGI_GLTF_NORMALS ? &l->normal : &l->position) = w->naccessors;
@@ -276,7 +281,7 @@ static size_t whole_bytes(const vgi_gltf_morphs *x, vgi_gltf_numbers kind)
     size_t points = 0;
     for (size_t i = 0; i < x->nlists; i++)
         for (int s = 0; s < sorts_of(&x->lists[i]); s++) {
-            if (has_base(x, &x->lists[i]) && kind_of_base(&x->lists[i], s) == kind) points += x->lists[i].count;
+            if (s < sorts_of_base(&x->lists[i]) && has_base(x, &x->lists[i]) && kind_of_base(&x->lists[i], s) == kind) points += x->lists[i].count;
             for (size_t t = 0; t < x->targets; t++)
                 if (!vgi_gltf_lying(x, t, i, s)->sparse && vgi_gltf_lying(x, t, i, s)->kind == kind) points += x->lists[i].count;
         }
@@ -390,7 +395,7 @@ static int emit_base(vgi_gltf_writing *w, int kind, vg_err *e)
     const vgi_gltf_morphs *x = w->own;
     int r = VG_OK;
     for (size_t i = 0; i < x->nlists && r == VG_OK; i++)
-        for (int s = 0; s < sorts_of(&x->lists[i]) && r == VG_OK && has_base(x, &x->lists[i]); s++)
+        for (int s = 0; s < sorts_of_base(&x->lists[i]) && r == VG_OK && has_base(x, &x->lists[i]); s++)
             if ((int)kind_of_base(&x->lists[i], s) == kind)
                 r = vgi_gltf_emit_points(w, kind_of_base(&x->lists[i], s), x->base[s] + 3 * x->lists[i].first,
                                          x->lists[i].count, true, e);

@@ -106,7 +106,7 @@ static const vgi_gltf_kind vgi_gltf_kinds[VGI_GLTF_KINDS] = {{VGI_GLTF_FLOAT, 12
 /* Vertices of the file that a primitive of a mesh refers to. */
 typedef struct vgi_gltf_list {
     size_t first, count;
-    bool normals;
+    bool normals, tangents; /* tangents: morph targets have some */
     size_t position, normal; /* their accessors */
     const vgi_gltf_grid *grid; /* its positions are whole numbers; NULL: they are binary32 */
 } vgi_gltf_list;
