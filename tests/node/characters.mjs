@@ -149,6 +149,7 @@ const report = {
     materials: JSON.stringify(materials(before)) === JSON.stringify(materials(after)),
     nodes: JSON.stringify(names(before)) === JSON.stringify(names(after)),
     animations: after.animations.map(c => c.name),
+    named: JSON.stringify(before.animations.map(c => c.name)) === JSON.stringify(after.animations.map(c => c.name)),
 };
 function names(gltf) {
     const out = [];
