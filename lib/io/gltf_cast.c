@@ -117,9 +117,12 @@ static int trim(vgi_gltf_writing *w, bool quantized, vg_err *e)
 int vgi_gltf_trim_cast(vgi_gltf_writing *w, bool quantized, vg_err *e)
 {
     vgi_gltf_scene *x = &w->character->scene;
+    int r = x->nclips ? VG_OK : vgi_gltf_read_animations(x, e);
+    if (r == VG_ENOMEM) return r;
     for (size_t i = 0; i < x->nparts; i++) x->parts[i].targets = NULL;
-    vgi_json_drop(x->g.json, "animations");
-    return trim(w, quantized, e);
+    if (r < 0 || w->ntakes != x->nclips) vgi_json_drop(x->g.json, "animations");
+    r = vgi_gltf_keep_still(x, e);
+    return r < 0 ? r : trim(w, quantized, e);
 }
 
 int vgi_gltf_trim_whole(vgi_gltf_writing *w, vg_err *e)
@@ -292,10 +295,12 @@ int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e)
     vgi_json *doc = vgi_json_copy(w->character->scene.g.json, e);
     int r = doc ? vgi_gltf_list_shapes(&w->character->scene, e) : VG_ENOMEM;
     if (doc) drop_made(doc);
+    if (doc && !w->still) vgi_json_drop(doc, "animations"); /* which are written with the others */
     if (r == VG_OK) r = drop_from_list(doc, "extensionsUsed", instancing, e);
     if (r == VG_OK) r = drop_from_list(doc, "extensionsRequired", instancing, e);
-    if (r == VG_OK) r = drop_from_list(doc, "extensionsUsed", pointers, e);
-    if (r == VG_OK) r = drop_from_list(doc, "extensionsRequired", pointers, e);
+    const bool animated = vgi_json_get(w->character->scene.g.json, "animations");
+    if (r == VG_OK && !animated) r = drop_from_list(doc, "extensionsUsed", pointers, e);
+    if (r == VG_OK && !animated) r = drop_from_list(doc, "extensionsRequired", pointers, e);
     if (r == VG_OK) r = cast_nodes(doc, &w->character->scene, k, e);
     if (r == VG_OK) r = vgi_gltf_raise_skins(&w->character->scene, doc, e);
     if (r == VG_OK && k->ngrids) r = vgi_gltf_put_grids(doc, k->grids, k->ngrids, e);

@@ -171,13 +171,44 @@ static void turn_normals(vgi_gltf_writing *w)
     else vgi_gltf_normals_turn(&w->normals, x->world, x->file[VGI_GLTF_NORMALS]);
 }
 
-static void spread_frame(vgi_gltf_writing *w)
+static size_t turned_bytes(const vgi_gltf_morphs *x)
+{
+    return VGI_GLTF_POINT * x->n * ((x->file[VGI_GLTF_NORMALS] != NULL) + (size_t)(x->file[VGI_GLTF_TANGENTS] != NULL));
+}
+
+/* Targets are asked for in order the first time. */
+static int keep_turned(vgi_gltf_writing *w, vg_err *e)
+{
+    vgi_gltf_morphs *x = w->own;
+    int r = VG_OK;
+    for (int s = VGI_GLTF_NORMALS; s < VGI_GLTF_SORTS && r == VG_OK; s++)
+        if (x->file[s]) r = vgi_output_put(&w->spool, x->file[s], VGI_GLTF_POINT * x->n, e);
+    x->kept += r == VG_OK;
+    return r;
+}
+
+static int load_turned(vgi_gltf_writing *w, size_t t, vg_err *e)
+{
+    vgi_gltf_morphs *x = w->own;
+    uint64_t at = (uint64_t)w->frames * VGI_GLTF_POINT * w->h->body.mesh.nv + (uint64_t)t * turned_bytes(x);
+    int r = vgi_output_flush(&w->spool, e);
+    for (int s = VGI_GLTF_NORMALS; s < VGI_GLTF_SORTS && r == VG_OK; s++) {
+        if (!x->file[s]) continue;
+        r = vgi_gltf_load(w, at, (unsigned char *)x->file[s], VGI_GLTF_POINT * x->n, e);
+        at += VGI_GLTF_POINT * x->n;
+    }
+    return r;
+}
+
+static int spread_frame(vgi_gltf_writing *w, size_t t, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
     if (x->world) find_world(w, x->first);
     if (w->character) vgi_gltf_character_pose(w->character, x->world, x->first, x->file[VGI_GLTF_POSITIONS]);
     else spread_plain(w);
+    if (t < x->kept) return load_turned(w, t, e);
     turn_normals(w);
+    return t == x->kept ? keep_turned(w, e) : VG_OK;
 }
 
 static void spread_basis(vgi_gltf_writing *w, size_t t)
@@ -229,10 +260,11 @@ int vgi_gltf_load_target(vgi_gltf_writing *w, size_t t, vg_err *e)
     int r = x->chosen ? load_frame(w, x->chosen[t], x->first, e) : VG_OK;
     if (!x->chosen) memcpy(x->first, x->basis.targets + t * n, n * sizeof *x->first);
     if (r < 0) return r;
-    if (x->chosen) spread_frame(w);
-    else spread_basis(w, t);
+    if (x->chosen) return spread_frame(w, t, e);
+    spread_basis(w, t);
     return VG_OK;
 }
+
 static int describe_weights(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_gltf_morphs *x = w->own;
@@ -338,7 +370,10 @@ static int say_take(vgi_gltf_writing *w, size_t number, vg_err *e)
 
 static int say_animations(vgi_gltf_writing *w, vg_err *e)
 {
+    size_t n = 0;
     int r = vgi_gltf_say(&w->json, e, ",\n\"animations\":[");
+    if (r == VG_OK && w->character) r = vgi_gltf_say_elements(w->character->scene.g.json, "animations", &w->json, &n, e);
+    if (r == VG_OK && n) r = vgi_gltf_say(&w->json, e, ",\n");
     for (size_t i = 0; i < w->ntakes && r == VG_OK; i++) r = say_take(w, i, e);
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "]");
 }

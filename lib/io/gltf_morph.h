@@ -35,6 +35,7 @@ typedef struct vgi_gltf_morphs {
     float *file[VGI_GLTF_SORTS];    /* of a target: of all vertices of the file */
     float *moving;         /* those of a list that it moves */
     double *world;         /* a pose of the mesh */
+    size_t kept;           /* targets whose normals and tangents are behind the frames in the spool: they cost more than reading */
     float *turned[VGI_GLTF_SORTS]; /* for a basis, the normals and tangents of all targets */
     vgi_gltf_laid *at;             /* targets x nlists x VGI_GLTF_SORTS */
     size_t weights;        /* number of their accessor */

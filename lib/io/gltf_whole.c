@@ -169,9 +169,19 @@ static bool keeps(const vgi_gltf_whole *k, size_t animation)
     return clip == SIZE_MAX ? vgi_gltf_whole_clips(k) == k->x->nclips : k->used[clip];
 }
 
+static const char key[] = "animations";
+
+/* Put the list that was made with result r into the document, if it is not empty. */
+static int put_animations(vgi_json *doc, vgi_json *kept, int r, vg_err *e)
+{
+    if (r == VG_OK && vgi_json_count(kept)) return vgi_json_put(doc, key, kept, e);
+    vgi_json_free(&kept);
+    vgi_json_drop(doc, key);
+    return r;
+}
+
 int vgi_gltf_whole_trim(vgi_gltf_whole *k, const char *name, vg_err *e)
 {
-    static const char key[] = "animations";
     vgi_json *doc = k->x->g.json, *kept = vgi_json_array(e);
     const vgi_json *all = vgi_json_get(doc, key);
     int r = kept ? VG_OK : VG_ENOMEM;
@@ -181,10 +191,17 @@ int vgi_gltf_whole_trim(vgi_gltf_whole *k, const char *name, vg_err *e)
         r = vgi_json_add(kept, copy, e);
         if (r == VG_OK && name && clip_of(k->x, i) != SIZE_MAX) r = vgi_json_put(copy, "name", vgi_json_of_text(name, e), e);
     }
-    if (r == VG_OK && vgi_json_count(kept)) return vgi_json_put(doc, key, kept, e);
-    vgi_json_free(&kept);
-    vgi_json_drop(doc, key);
-    return r;
+    return put_animations(doc, kept, r, e);
+}
+
+int vgi_gltf_keep_still(vgi_gltf_scene *x, vg_err *e)
+{
+    const vgi_json *all = vgi_json_get(x->g.json, key);
+    vgi_json *kept = vgi_json_array(e);
+    int r = kept ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < vgi_json_count(all) && r == VG_OK; i++)
+        if (clip_of(x, i) == SIZE_MAX) r = vgi_json_add(kept, vgi_json_copy(vgi_json_at(all, i), e), e);
+    return put_animations(x->g.json, kept, r, e);
 }
 
 /* ---- opening ---- */

@@ -33,6 +33,8 @@ size_t vgi_gltf_whole_clips(const vgi_gltf_whole *k); /* how many are used */
 /* vgi_gltf_whole_trim: the document keeps the animations that are used, and those that move no vertex if all of the others
  * are. name (may be NULL): what the only one is called. */
 int vgi_gltf_whole_trim(vgi_gltf_whole *k, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_keep_still: the document keeps only animations that move no vertex, such as those of a camera. */
+int vgi_gltf_keep_still(vgi_gltf_scene *x, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_whole_clear(vgi_gltf_whole *k);
 
 #endif
