@@ -20,6 +20,7 @@
 #include "method/pairs/springs.h"
 #include "numeric/face.h"
 #include "model/incidence.h"
+#include "numeric/stats.h"
 
 #include <stdlib.h>
 
@@ -27,12 +28,15 @@ static const double REST = 1e-7;           /* pull to the current position, for 
 static const double IDENTITY_TRUST = 1e-6; /* where no face determines the deformation */
 
 /* Lengths are in D. Results on real pairs do not change when these values change by up to a factor of two. */
-static const double MARKER = 3;           /* weight of ties, relative to bending */
-static const double STRETCH = 0.03;       /* length above which stretching counts more than bending */
-static const double FIRST_SPAN = 0.075;   /* radius over which a nearest point pulls its neighbourhood, in the first
+static const double MARKER = 3;           /* weight of ties, relative to bending and stretching */
+static const double STRETCH = 0.004;      /* length above which stretching counts more than bending */
+static const double MOST_STRETCH = 2;     /* weight of stretching, relative to bending, on coarse meshes */
+static const double FIRST_SPAN = 0.075;    /* radius over which a nearest point pulls its neighbourhood, in the first
                                              round */
 static const double LAST_SPAN = 0.7;      /* and in the last round, in mean edge lengths */
 static const double FIRST_LIMIT = 0.1, LAST_LIMIT = 0.02; /* nearest points farther away are ignored */
+static const double TIED_LIMIT = 0.07;    /* the first limit at least, once ties have brought the surfaces together */
+static const double TIMES_MEDIAN = 8;     /* the first limit, in medians of the distances after the ties */
 static const double COSINE = 0.4;         /* least cosine of the angle between matching normals */
 static const double MAP_SPAN = 0.07;      /* length over which the maps of faces are smoothed */
 static const double KEPT_STRETCH = 0.8;   /* exponent of a map's stretch: parts without constraints return to their
@@ -76,6 +80,7 @@ typedef struct fit {
     vgi_surface *now;  /* the source at the start of the round */
     double limit;
     double stretch;    /* weight of first differences */
+    double tie;        /* weight of ties */
 } fit;
 
 /* ---- the matrix ---- */
@@ -102,7 +107,7 @@ static int factorize_matrix(fit *t, vg_err *e)
         const vgi_tie *tie = &t->in->tie[i];
         for (int a = 0; a < 3; a++)
             for (int b = 0; b <= a; b++) {
-                double w = MARKER * tie->weight * tie->share[a] * tie->share[b];
+                double w = t->tie * tie->weight * tie->share[a] * tie->share[b];
                 *entry(A, tie->vertex[a], tie->vertex[b]) += a != b && tie->vertex[a] == tie->vertex[b] ? 2 * w : w;
             }
     }
@@ -327,7 +332,7 @@ static void add_pulls(fit *t)
     for (size_t i = 0; i < t->in->nties; i++) {
         const vgi_tie *tie = &t->in->tie[i];
         for (int a = 0; a < 3; a++)
-            vgi_add_scaled(t->rhs + 3 * (size_t)tie->vertex[a], MARKER * tie->weight * tie->share[a], tie->point);
+            vgi_add_scaled(t->rhs + 3 * (size_t)tie->vertex[a], t->tie * tie->weight * tie->share[a], tie->point);
     }
 }
 
@@ -453,18 +458,36 @@ static void tell(const fit *t, size_t round, double stiffness)
     t->in->step(t->in->context, &s);
 }
 
+/* The limit of the first round: where many ties have brought the surfaces together, a far nearest point is a wrong
+ * one, as the other lip's. */
+static int first_limit(fit *t, double *limit, vg_err *e)
+{
+    size_t n = 0;
+    double *distance = vgi_array(t->m->nv, sizeof *distance, e);
+    *limit = t->limit = FIRST_LIMIT;
+    if (!distance) return VG_ENOMEM;
+    follow_target(t, 0, true);
+    for (size_t v = 0; v < t->m->nv; v++)
+        if (t->L.sum[v] > 0 && (!t->in->take_vertex || t->in->take_vertex[v])) distance[n++] = fmin(t->distance[v], FIRST_LIMIT);
+    if (n) *limit = fmin(FIRST_LIMIT, fmax(TIED_LIMIT, TIMES_MEDIAN * vgi_median(distance, n)));
+    free(distance);
+    return VG_OK;
+}
+
 static int run_rounds(fit *t, vg_err *e)
 {
     int r = VG_OK;
+    double widest = FIRST_LIMIT;
     if (t->in->nties) {
         r = factorize_matrix(t, e);
         for (int i = 0; i < TIED_SOLVES && r == VG_OK; i++) r = solve_round(t, e);
+        if (r == VG_OK) r = first_limit(t, &widest, e);
     }
     for (int round = 0; round < ROUNDS && r == VG_OK; round++) {
         double progress = round / (double)(ROUNDS - 1), first = FIRST_SPAN / t->edge;
         double span = first > LAST_SPAN ? first * pow(LAST_SPAN / first, progress) : LAST_SPAN;
         double weight = pow(span, -4); /* bending scales with the fourth power of length */
-        t->limit = FIRST_LIMIT * pow(LAST_LIMIT / FIRST_LIMIT, progress);
+        t->limit = widest * pow(LAST_LIMIT / widest, progress);
         for (int i = 0; i < SOLVES && r == VG_OK; i++) {
             follow_target(t, weight, i == 0);
             if (i == 0) r = follow_reverse(t, weight * progress * progress, e);
@@ -487,7 +510,8 @@ static void measure_edges(fit *t)
             weight += L->weight[i];
         }
     t->edge = weight > 0 && sum > 0 ? sum / weight : 1;
-    t->stretch = t->edge / STRETCH * t->edge / STRETCH;
+    t->stretch = fmin(t->edge / STRETCH * t->edge / STRETCH, MOST_STRETCH);
+    t->tie = MARKER * (1 + t->stretch);
 }
 
 static int prepare_fit(fit *t, vg_err *e)
