@@ -444,14 +444,14 @@ static void keep_source(work *w)
     if (from->mesh.nv) memcpy(to->reference, from->reference, 3 * from->mesh.nv * sizeof *to->reference);
 }
 
-static vg_cross_transfer *make_carrier(const work *w, vg_method method)
+static vg_cross_transfer *make_carrier(const work *w, vg_method method, bool expressions)
 {
     vg_err e;
     vg_cross_transfer *c;
     const double *target = w->target.body.reference;
     int r = vg_cross_transfer_new(&c, &w->source.body.mesh, w->source.body.reference, &w->pairs.correspondence, w->to, target,
                                   method, cli_threads(), &e);
-    if (r == VG_OK && method == VG_BY_OFFSET && w->fitted) r = vg_cross_transfer_fitted(c, target, w->fitted, &e);
+    if (r == VG_OK && method == VG_BY_OFFSET && w->fitted) r = vg_cross_transfer_fitted(c, target, w->fitted, expressions, &e);
     if (r < 0) cli_die(&e);
     return c;
 }
@@ -459,7 +459,7 @@ static vg_cross_transfer *make_carrier(const work *w, vg_method method)
 static void make_expressions(work *w)
 {
     vg_err e;
-    w->expressions = make_carrier(w, VG_BY_OFFSET);
+    w->expressions = make_carrier(w, VG_BY_OFFSET, true);
     if (vg_pinner_new(&w->rests, w->from, w->source.body.reference, w->from, NULL, false, &e) < 0) cli_die(&e);
 }
 
@@ -476,7 +476,7 @@ static void make_step(work *w)
     w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
-        w->carrier = make_carrier(w, method);
+        w->carrier = make_carrier(w, method, false);
         if (w->by == BY_AUTO && w->fitted) make_expressions(w);
     } else if (w->way == SHAPE) {
         r = vg_shaper_new(&w->shaper, w->to, w->source.body.reference, t->body.reference, cli_threads(), &e);

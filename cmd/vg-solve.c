@@ -13,7 +13,7 @@ static struct {
     double eps;
     bool planar;
     double planar_weights[2]; /* of the vectors, and of the planes */
-} opts = {.rounds = 40, .eps = 0.5, .planar_weights = {0.5, 1}};
+} opts = {.rounds = 100, .eps = 0.5, .planar_weights = {0.5, 1}};
 
 static void take_planar_weights(const char *text, void *context)
 {
@@ -28,7 +28,7 @@ static const cli_option options[] = {
      .choice = &opts.weights},
     {"fit", 0, "absolute|squares", "least sum of the faces' misfits (default), or of their squares, which is faster",
      .choice = &opts.fit},
-    {"rounds", 0, "N", "the most rounds of --fit absolute (default: 40)", .integer = &opts.rounds, .least = 1,
+    {"rounds", 0, "N", "the most rounds of --fit absolute (default: 100)", .integer = &opts.rounds, .least = 1,
      .most = 100000},
     {"eps", 0, "X", "misfits below this fraction of the mean count by their squares (default: 0.5)",
      .number = &opts.eps, .least = 1e-6, .most = 1e6},

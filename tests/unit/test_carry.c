@@ -194,7 +194,7 @@ static void offset_adds_growth(void)
     vg_cross_transfer *x;
     vg_err e;
     CHECK(vg_cross_transfer_new(&x, &h.body.mesh, h.body.reference, &k, g, other.body.reference, VG_BY_OFFSET, 1, &e) == VG_OK);
-    CHECK(vg_cross_transfer_fitted(x, other.body.reference, other.body.reference, &e) == VG_OK);
+    CHECK(vg_cross_transfer_fitted(x, other.body.reference, other.body.reference, false, &e) == VG_OK);
     const double *in = pose;
     vg_cross_transfer_apply(x, 1, &in, &w);
     for (size_t i = 0; i < 3 * vg_graph_corners(g); i += 3) {
@@ -209,6 +209,51 @@ static void offset_adds_growth(void)
     vg_graph_free(&g);
     vg_correspondence_clear(&k);
     vg_head_clear(&h), vg_head_clear(&other);
+}
+
+/* The sheet that the other one's size is measured in: 1 where two people share a unit, powers of ten where they do not,
+ * and the ratio itself of two copies of one shape. The pose stretches the source and turns it by `angle`: by little,
+ * its displacements arrive as they are; by much, what the target differs by turns along. */
+static void expressions_are_added(double a, double b, double size, double angle)
+{
+    static const double p = 1.2, q = 0.9;
+    double c = cos(angle), s = sin(angle), C = angle < 1 ? 1 : c, S = angle < 1 ? 0 : s, worst = 0;
+    vg_head h = make_uneven_sheet(6, 1, 1), other = make_uneven_sheet(6, a, b);
+    size_t nv = h.body.mesh.nv;
+    vg_correspondence k = chance_pairs(&h.body.mesh, &other.body.mesh, 2, true);
+    for (size_t f = 0; f < h.body.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = (uint32_t)f;
+    vg_graph *g = graph_of(&other);
+    double *t = vectors_of(g, other.body.reference), *r = vectors_of(g, h.body.reference), *w = room(3 * vg_graph_corners(g), sizeof *w);
+    double *pose = room(3 * nv, sizeof *pose);
+    for (size_t v = 0; v < nv; v++) {
+        double y = q * h.body.reference[3 * v + 1];
+        memcpy(pose + 3 * v, (double[]){p * h.body.reference[3 * v], c * y, s * y}, 3 * sizeof *pose);
+    }
+    vg_cross_transfer *x;
+    vg_err e;
+    CHECK(vg_cross_transfer_new(&x, &h.body.mesh, h.body.reference, &k, g, other.body.reference, VG_BY_OFFSET, 1, &e) == VG_OK);
+    CHECK(vg_cross_transfer_fitted(x, other.body.reference, other.body.reference, true, &e) == VG_OK);
+    const double *in = pose;
+    vg_cross_transfer_apply(x, 1, &in, &w);
+    for (size_t i = 0; i < 3 * vg_graph_corners(g); i += 3) {
+        double off = t[i + 1] - size * r[i + 1];
+        double want[3] = {t[i] + size * (p - 1) * r[i], size * c * q * r[i + 1] + C * off, size * s * q * r[i + 1] + S * off};
+        for (int l = 0; l < 3; l++) worst = fmax(worst, fabs(w[i + (size_t)l] - want[l]));
+    }
+    CHECK_NEAR(worst, 0, 1e-12 * size);
+    vg_cross_transfer_free(&x);
+    free(t), free(r), free(w), free(pose);
+    vg_graph_free(&g);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&h), vg_head_clear(&other);
+}
+
+static void expressions(void)
+{
+    expressions_are_added(0.9, 0.95, 1, M_PI / 6);
+    expressions_are_added(0.9, 0.95, 1, M_PI / 2);
+    expressions_are_added(90, 95, 100, M_PI / 6);
+    expressions_are_added(1.1, 1.1, 1.1, M_PI / 6);
 }
 
 static void threads_do_not_matter(void)
@@ -588,4 +633,5 @@ TESTS({"a turning source turns every target", rotation_passes},
       {"a sheet folded flat drives a face across the crease", a_fold_is_finite},
       {"the area metric of triangles is the cotangent Laplacian", area_metric_is_cotangents},
       {"by shape: a mesh onto itself is its pose", shape_onto_itself},
-      {"by shape: vectors of the target at centroids of the source", shape_of_the_reference})
+      {"by shape: vectors of the target at centroids of the source", shape_of_the_reference},
+      {"expressions are added", expressions})

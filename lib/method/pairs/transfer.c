@@ -7,6 +7,7 @@
 #include "method/pairs/places.h"
 #include "method/pairs/transfer_kernel.h"
 #include "numeric/face.h"
+#include "numeric/polar.h"
 #include "numeric/vec3.h"
 #include "method/vectors/moments.h"
 #include "model/incidence.h"
@@ -17,6 +18,10 @@
 
 enum { CHUNK = 512, ENOUGH = 64 };
 static const double ALIKE = 0.5; /* largest difference of a face from its places, relative to its vectors */
+/* Expressions: cosines of the angles up to which an offset stays as it is, and from which it turns with its face. */
+static const double STAYS = 0.707, TURNS = 0.259;
+static const double OWN_SIZE = 1.25; /* sizes that differ by less may be those of two people, measured in one unit */
+static const double COPY = 1e-3;     /* of D: target and places are one shape, in two sizes */
 
 struct vg_cross_transfer {
     const vg_mesh *source;
@@ -26,7 +31,8 @@ struct vg_cross_transfer {
     int threads;
     const double *source_reference;
     double ratio;          /* size of the target relative to the source */
-    double scale;          /* that of the fitted source */
+    double scale;          /* of motions, by offset */
+    bool expressions;      /* offsets turn only where faces turn far */
     double *p, *q;         /* see vgi_source */
     unsigned char *slow;   /* per source face: 1: a line segment; 2: no gradient in the reference pose, never drives */
     double *segment;       /* reference vector of each source face's first corner */
@@ -396,6 +402,19 @@ static void add_drift(const transfer_job *j, size_t f, const vgi_map *map)
         }
 }
 
+/* The rotation of an offset in an expression, from the map of its face: none for small angles, the face's for large
+ * ones, and between them a mean. Expressions are sums (MATH 5). */
+static void hold_small_turns(vgi_map *map)
+{
+    vgi_map turn;
+    vgi_transfer_kernel_now()->polar(map, &turn);
+    for (size_t k = 0; k < VGI_LANES; k++) {
+        double cosine = (turn.m[0][k] + turn.m[4][k] + turn.m[8][k] - 1) / 2;
+        double x = fmin(fmax((STAYS - cosine) / (STAYS - TURNS), 0), 1), share = x * x * (3 - 2 * x);
+        for (int i = 0; i < 9; i++) map->m[i][k] = share * turn.m[i][k] + (i % 4 == 0 ? 1 - share : 0);
+    }
+}
+
 /* Add the vectors of the places, at the target's size. */
 static void add_places(const transfer_job *j, size_t f)
 {
@@ -434,6 +453,7 @@ static void follow_face(const transfer_job *j, size_t f)
         }
     }
     vgi_transfer_kernel_now()->finish(&sum, weight);
+    if (placed && c->expressions) hold_small_turns(&sum);
     vgi_transfer_kernel_now()->follow(&sum, rigid || placed ? VGI_FOLLOW_RIGID : how[c->method],
                                       (placed ? c->offset : c->vectors) + 3 * begin,
                                       g->faces.start[f + 1] - begin, j->out, 3 * begin, j->lanes);
@@ -504,13 +524,56 @@ static bool place_face(vg_cross_transfer *c, size_t f)
     return off2 < ALIKE * ALIKE * size2;
 }
 
-int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_reference, const double *fitted, vg_err *e)
+/* The size of the target relative to that of its places on the source, both about their centroids; *miss: the mean
+ * distance that is left, relative to the target's size. */
+static double relative_size(const vg_cross_transfer *c, const double *target, double *miss)
+{
+    const double *places = c->points[0];
+    double from[3] = {0}, to[3] = {0}, a = 0, b = 0, S[9] = {0}, q[4], R[9], left = 0;
+    size_t n = 0, nv = c->target->faces.nv;
+    for (size_t v = 0; v < nv; v++) {
+        if (c->place[v].face == UINT32_MAX) continue;
+        vgi_add(from, places + 3 * v), vgi_add(to, target + 3 * v);
+        n++;
+    }
+    if (!n) return 0;
+    vgi_divide(from, (double)n), vgi_divide(to, (double)n);
+    for (size_t v = 0; v < nv; v++) {
+        double x[3], y[3];
+        if (c->place[v].face == UINT32_MAX) continue;
+        vgi_subtract(places + 3 * v, from, x), vgi_subtract(target + 3 * v, to, y);
+        a += vgi_dot(x, x), b += vgi_dot(y, y);
+        vgi_add_outer(S, 1, y, x);
+    }
+    if (!(a > 0) || !(b > 0)) return 0;
+    vgi_best_turn(S, q);
+    vg_quat_matrix(q, R);
+    for (int k = 0; k < 9; k++) left += S[k] * R[k];
+    *miss = sqrt(fmax(2 - 2 * left / sqrt(a * b), 0)); /* of both, at unit size */
+    return sqrt(b / a);
+}
+
+/* How much larger motions are on the target. Heads of people differ by a tenth, but a lid or a lip moves as far on
+ * both (MATH 5): sizes that are near a power of ten are those of a unit, unless the shapes are the same. */
+static void set_motion_size(vg_cross_transfer *c, const double *target)
+{
+    double miss = 0, size = relative_size(c, target, &miss);
+    if (!(size > 0)) return;
+    double unit = pow(10, round(log10(size)));
+    bool people = miss > COPY && size < OWN_SIZE * unit && size * OWN_SIZE > unit;
+    c->scale = people ? unit : size;
+}
+
+int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_reference, const double *fitted,
+                             bool expressions, vg_err *e)
 {
     const vg_graph *g = c->target;
     c->scale = vg_diagonal(fitted, c->source->nv) / vg_diagonal(c->source_reference, c->source->nv);
+    c->expressions = expressions;
     int r = make_places(c, target_reference, fitted, e);
     if (r < 0) return r;
     place_points(c, c->source_reference, c->points[0]);
+    if (expressions) set_motion_size(c, target_reference);
     for (size_t f = 0; f < g->faces.nf - g->nlinks; f++) c->placed[f] = place_face(c, f);
     return VG_OK;
 }
