@@ -300,6 +300,16 @@ static void weld_like_sequence(work *w)
     vg_head_clear(&again);
 }
 
+/* What to do where the target is another mesh; of skeletons, joints pair by name or a rig is wanted. */
+static const char *advise_other_mesh(const work *w)
+{
+    bool from = w->h->body.skeleton.njoints, to = w->target.body.skeleton.njoints;
+    if (from && to) return ": a skeleton of other joints takes a sequence of vertices";
+    if (from) return ": the input is a skeleton, and the target is none: vg-fitmap makes a rig, which vg-play drives";
+    if (to) return ": the target is a skeleton, and the input is none: vg-fitmap --skeleton finds the motion of its bones";
+    return ": pair them with vg-register and --correspondence";
+}
+
 /* The graphs: of a pair with one connectivity, the source's serves both. */
 static void make_graphs(work *w)
 {
@@ -314,10 +324,7 @@ static void make_graphs(work *w)
         snprintf(name, sizeof name, "'%.190s'", opts.onto);
         if (vg_mesh_same(&w->h->body.mesh, "the sequence", &w->target.body.mesh, name, &e) < 0) {
             size_t n = strlen(e.message);
-            bool skeletons = w->h->body.skeleton.njoints && w->target.body.skeleton.njoints;
-            snprintf(e.message + n, sizeof e.message - n,
-                     skeletons ? ": a skeleton of other joints takes a sequence of vertices"
-                               : ": pair them with vg-register and --correspondence");
+            snprintf(e.message + n, sizeof e.message - n, "%s", advise_other_mesh(w));
             cli_die(&e);
         }
     }

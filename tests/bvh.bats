@@ -155,6 +155,21 @@ END
     says "has 212 vertices where 'a.bvh' has 11"
 }
 
+@test "a skeleton onto a mesh, a mesh onto a skeleton: what to do, and it is not vg-register" {
+    mesh cube >cube.obj
+    walk 3 >walk.bvh
+    must_fail 3 vg-deform --onto cube.obj walk.bvh -o out.vgs
+    says 'the input is a skeleton, and the target is none: vg-fitmap makes a rig, which vg-play drives'
+    one_line
+    must_fail 3 vg-deform --onto walk.bvh cube.obj -o out.vgs
+    says 'the target is a skeleton, and the input is none: vg-fitmap --skeleton'
+    one_line
+    sed -E 's/(ROOT|JOINT) /\1 x/' walk.bvh >names.bvh
+    must_fail 3 vg-deform --onto names.bvh walk.bvh -o out.vgs
+    says '--joints pairs them by a file'
+    nothing_but cube.obj walk.bvh names.bvh
+}
+
 @test "what a BVH file cannot hold is said" {
     mesh cube >cube.obj
     must_fail 3 vg-decode cube.obj -o cube.bvh

@@ -74,7 +74,7 @@ static int pair_joints(vg_driver *d, const uint32_t *partner, vg_err *e)
     if (found) return VG_OK;
     return vg_fail(e, VG_EINPUT,
                    "no joint of the skeleton has the name of a bone of the rig, such as '%.80s', nor a usual name "
-                   "for the same part of the body",
+                   "for the same part of the body: --joints pairs them by a file",
                    s->joints[d->r->bone[0]].name);
 }
 
