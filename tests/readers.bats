@@ -480,3 +480,60 @@ EOF
     one_line
     says "left out 2 points, curves or surfaces"
 }
+
+# opens STREAM: corners of the lips that touch in the first frame are half a unit apart in the second
+opens() {
+    py "$1" <<'END'
+import math, sys
+import read_stream
+s = read_stream.read_stream(sys.argv[1])
+at = [[f.values[3 * v:3 * v + 3] for v in range(len(f.values) // 3)] for f in s.frames]
+assert len(at) == 2, len(at)
+pairs = [(a, b) for a in range(len(at[0])) for b in range(a) if math.dist(at[0][a], at[0][b]) < 1e-6]
+assert len(pairs) == 2, pairs
+for a, b in pairs: assert abs(math.dist(at[1][a], at[1][b]) - 0.5) < 0.1, (a, b)
+END
+}
+
+@test "glTF: a mouth closed in the neutral pose opens: without welding, of two primitives, as a GLB" {
+    cp "$DATA"/reports/lips_*.gltf .
+    local name
+    for name in source target; do must vg-encode --weld off lips_$name.gltf -o $name.vgs; done
+    pipe 'vg-deform --onto target.vgs source.vgs | vg-solve -o out.vgs'
+    opens out.vgs
+    # the upper lip and the lower one are primitives of their own, with vertices of their own
+    py <<'END'
+import base64, json, struct
+for name in "source", "target":
+    g = json.load(open(f"lips_{name}.gltf"))
+    raw = base64.b64decode(g["buffers"][0]["uri"].split(",")[1])
+    index = struct.unpack_from("<21H", raw, 120)
+    data, views, accessors, parts = b"", [], [], []
+    def put(values, form, kind, extra={}):
+        global data
+        b = struct.pack(f"<{len(values)}{form}", *values)
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(b)})
+        accessors.append({"bufferView": len(views) - 1, "componentType": 5126 if form == "f" else 5123, "type": kind,
+                          "count": len(values) // (3 if kind == "VEC3" else 1), **extra})
+        data += b + bytes(-len(b) % 4)
+        return len(accessors) - 1
+    for faces in (0, 1, 4), (2, 3, 5, 6):
+        used = sorted({v for f in faces for v in index[3 * f:3 * f + 3]})
+        def points(offset):
+            x = [x for v in used for x in struct.unpack_from("<3f", raw, offset + 12 * v)]
+            return put(x, "f", "VEC3", {"min": [min(x[k::3]) for k in range(3)], "max": [max(x[k::3]) for k in range(3)]})
+        part = {"attributes": {"POSITION": points(0)}, "indices": put([used.index(v) for f in faces for v in index[3 * f:3 * f + 3]], "H", "SCALAR")}
+        if name == "source": part["targets"] = [{"POSITION": points(164)}]
+        parts.append(part)
+    g["meshes"][0]["primitives"] = parts
+    g["accessors"], g["bufferViews"], g["buffers"] = accessors, views, [{"byteLength": len(data)}]
+    j = json.dumps(g).encode()
+    j += b" " * (-len(j) % 4)
+    open(f"two_{name}.glb", "wb").write(struct.pack("<4sIIII", b"glTF", 2, 28 + len(j) + len(data), len(j), 0x4E4F534A) + j +
+                                        struct.pack("<II", len(data), 0x004E4942) + data)
+END
+    pipe 'vg-encode two_source.glb | vg-deform --onto two_target.glb | vg-solve -o out.vgs'
+    opens out.vgs
+    pipe 'vg-encode two_target.glb | vg-info' # alone it is welded: the lips are one
+    shows 'vertices    8'
+}
