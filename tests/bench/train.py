@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """make bench-train: how well networks go on, beside the bounds of doc/MATH.md 12, on the kit of real animations.
 
-VG_DATA names the folder of the kit. ONLY="walk dance": these parts alone; of: walk dance trex cow keys long ablation speed,
-and, some minutes to an hour each: full mesh.
+VG_DATA names the folder of the kit. ONLY="walk dance": these parts alone; of: walk dance trex cow keys long ablation speed bodies,
+and, some minutes to an hour each: full mesh memory.
 Prints a table in Markdown; a row ends with its bound and "missed" when it is not met; then the exit status is 1.
 SPDX-License-Identifier: GPL-3.0-or-later
 """
@@ -273,16 +273,60 @@ def speed():
         row(f"{model}, its products at the speed of sgemm", [1000 * products(model, vertices, rank) / sgemm_speed()])
 
 
+def bodies():
+    """several bodies, or several actions of one, in one training, beside each alone"""
+    man, heavy = sequence("walk-man", "human"), sequence("walk-heavy", "human")
+    acts = [sequence(f"trex-{act}", "hybrid") for act in ("walk", "run", "attack")]
+    for name, poses in (("walk-man", man), ("walk-heavy", heavy), ("walk-man and walk-heavy", f"{man} {heavy}"),
+                        ("three actions of trex", " ".join(acts))):
+        errors, _, _ = train(poses, "--hold-at end")
+        for method in ("damped", "regression", "network"):
+            for given in (1, 3):
+                if (method, given) in errors:
+                    row(f"{name}, {method}, {given} given", errors[method, given])
+
+
+def torus(around, across, frames):
+    """a stream of a moving torus"""
+    faces = [(i * across + k, (i + 1) % around * across + k, (i + 1) % around * across + (k + 1) % across,
+              i * across + (k + 1) % across) for i in range(around) for k in range(across)]
+    quads = "".join("f {} {} {} {}\n".format(*(v + 1 for v in face)) for face in faces)
+    for t in range(frames):
+        with open(f"torus.{t:03d}.obj", "w", encoding="ascii") as file:
+            for i in range(around):
+                u, phase = 2 * math.pi * i / around, 2 * math.pi * t / 17
+                thick = 0.3 + 0.05 * math.sin(3 * u + phase)
+                for k in range(across):
+                    v = 2 * math.pi * k / across
+                    far = 1 + 0.1 * math.sin(phase + 2 * u) + thick * math.cos(v)
+                    high = thick * math.sin(v) + 0.2 * math.sin(2 * u + phase) + 0.05 * math.sin(0.7 * phase) * math.cos(3 * u)
+                    file.write(f"v {far * math.cos(u):.6f} {far * math.sin(u):.6f} {high:.6f}\n")
+            file.write(quads)
+    run("vg-encode -q torus.*.obj -o torus.vgs")
+    return "torus.vgs"
+
+
+def memory():
+    """the most that conv as printed holds at 13,380 vertices, one thread"""
+    poses = torus(223, 60, 48)
+    for name, options in (("", ""), (", no KL", "--loss kl=0")):
+        with subprocess.Popen(f"exec vg-train -q -j 1 --model conv --iterations 2 {options} {poses} -o x.net", shell=True) as process:
+            _, status, used = os.wait4(process.pid, 0)
+        if status:
+            sys.exit("train.py: vg-train failed")
+        row(f"conv{name}, 13,380 vertices, GB", [used.ru_maxrss / 1e6], (1,))
+
+
 def main():
     if not os.path.isdir(f"{KIT}/human"):
         sys.exit("train.py: VG_DATA must name the folder of the kit")
     print("| what | mean error, % of D, 5 10 15 frames ahead (or as it says) | bound |\n|---|---|---|", flush=True)
     parts = {"walk": walk, "dance": dance, "trex": trex, "cow": cow, "keys": keys, "long": long_run,
-             "ablation": ablation, "speed": speed, "full": full, "mesh": mesh}
+             "ablation": ablation, "speed": speed, "bodies": bodies, "full": full, "mesh": mesh, "memory": memory}
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         for name, part in parts.items():
-            if name in ONLY or (not ONLY and name not in ("full", "mesh")):
+            if name in ONLY or (not ONLY and name not in ("full", "mesh", "memory")):
                 part()
     sys.exit(1 if missed else 0)
 
