@@ -333,7 +333,7 @@ sys.stdout.buffer.write(b[:-40])" >cut.vgs' _ "$(horse vgs)"
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
     for model in auto conv; do
         must vg-train $small --batch 13 --model $model --iterations 6 -j 1 "$(horse vgs)" -o one.net
-        for n in 2 3; do
+        for n in 2 4; do
             must mpirun -q --oversubscribe -n $n vg-train $small --batch 13 --model $model --iterations 6 -j 1 "$(horse vgs)" -o two.net
             must cmp one.net two.net
         done
