@@ -163,7 +163,8 @@ size_t vg_pinner_find(vg_pinner *p, const double *pose, const uint32_t **vertice
  * 3.7-3.9), by one sparse Cholesky factorisation, many poses per solve. */
 typedef struct vg_solver vg_solver;
 /* The metric of the misfit: all corners alike (T 3.7), or the reference surface's metric, which does not depend on
- * how the surface is cut into faces (cotangent weights on triangles). Both meet consistent vectors exactly. */
+ * how the surface is cut into faces: cotangent weights on triangles that are not thin. Both meet consistent vectors
+ * exactly. */
 typedef enum vg_weights { VG_WEIGHTS_UNIFORM = 0, VG_WEIGHTS_AREA = 1 } vg_weights;
 typedef struct vg_solver_stats {
     size_t unknowns, factor_entries; /* entries of the factor, explicit zeros included */

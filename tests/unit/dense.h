@@ -32,12 +32,13 @@ static inline void eliminate(double *a, double *b, size_t n, size_t m)
         }
 }
 
-/* G of a face with VG_WEIGHTS_AREA, r x r: w (B B' + tr(C+) K K') with R the vectors in the face's plane, C = R R',
- * B = R' C+, K = I - 11'/r - B R, w its area. */
+/* G of a face with VG_WEIGHTS_AREA, r x r: w (B B' + 2/p (I - 11'/r - B R)) with R the vectors in the face's plane,
+ * C = R R', p its larger eigenvalue, B = R' C+, w its area. The smaller eigenvalue counts as p/4 at least, p/12 in a
+ * triangle. */
 static inline void face_metric(const double *vectors, size_t r, double *G)
 {
     double n[3] = {0, 0, 0}, C[9] = {0};
-    double *R = room(3 * r, sizeof *R), *B = room(3 * r, sizeof *B), *K = room(r * r, sizeof *K);
+    double *R = room(3 * r, sizeof *R), *B = room(3 * r, sizeof *B);
     for (size_t i = 0; i < r; i++)
         for (int k = 0; k < 3; k++) {
             const double *a = vectors + 3 * i, *b = vectors + 3 * ((i + 1) % r);
@@ -50,30 +51,29 @@ static inline void face_metric(const double *vectors, size_t r, double *G)
         for (size_t k = 0; k < 3; k++) R[3 * i + k] = vectors[3 * i + k] - along * n[k] / twice;
         for (size_t k = 0; k < 9; k++) C[k] += R[3 * i + k / 3] * R[3 * i + k % 3];
     }
-    /* C has rank 2, with eigenvalues p and q in the plane: C+ = ((p + q) P - C) / (p q), P = I - nn' */
-    double trace = C[0] + C[4] + C[8], square = 0, inverse[9];
-    for (int k = 0; k < 9; k++) square += C[k] * C[k];
-    for (int k = 0; k < 9; k++)
-        inverse[k] =
-            2 * (trace * ((k % 4 == 0) - n[k / 3] * n[k % 3] / (twice * twice)) - C[k]) / (trace * trace - square);
+    /* C has rank 2: in the plane P = I - nn' it is (p + q)/2 P + (p - q)/2 (uu' - vv'), with the eigenvalues p >= q */
+    double half = (C[0] + C[4] + C[8]) / 2, spread = 0, plane[9], inverse[9];
+    for (int k = 0; k < 9; k++) {
+        plane[k] = (k % 4 == 0) - n[k / 3] * n[k % 3] / (twice * twice);
+        spread += (C[k] - half * plane[k]) * (C[k] - half * plane[k]) / 2;
+    }
+    spread = sqrt(spread);
+    double p = half + spread, q = fmax(half - spread, p / (r == 3 ? 12 : 4));
+    for (int k = 0; k < 9; k++) {
+        inverse[k] = (1 / p + 1 / q) / 2 * plane[k];
+        if (spread > 0) inverse[k] += (1 / p - 1 / q) / 2 * (C[k] - half * plane[k]) / spread;
+    }
     for (size_t i = 0; i < r; i++)
         for (size_t k = 0; k < 9; k++) B[3 * i + k / 3] += inverse[k] * R[3 * i + k % 3];
     for (size_t i = 0; i < r; i++)
         for (size_t j = 0; j < r; j++) {
-            K[i * r + j] = (i == j) - 1.0 / (double)r;
-            for (size_t k = 0; k < 3; k++) K[i * r + j] -= B[3 * i + k] * R[3 * j + k];
-        }
-    for (size_t i = 0; i < r; i++)
-        for (size_t j = 0; j < r; j++) {
-            double sum = 0;
-            for (size_t k = 0; k < r; k++) sum += K[i * r + k] * K[j * r + k];
-            sum *= inverse[0] + inverse[4] + inverse[8];
-            for (size_t k = 0; k < 3; k++) sum += B[3 * i + k] * B[3 * j + k];
+            double sum = ((i == j) - 1.0 / (double)r) * 2 / p;
+            for (size_t k = 0; k < 3; k++)
+                sum += B[3 * i + k] * B[3 * j + k] - B[3 * i + k] * R[3 * j + k] * 2 / p;
             G[i * r + j] = twice / 2 * sum;
         }
     free(R);
     free(B);
-    free(K);
 }
 
 #endif

@@ -529,18 +529,31 @@ static void a_fold_is_finite(void)
     vg_head_clear(&target);
 }
 
-/* On triangles the area metric is the cotangent Laplacian:
- * G_ij = -cot(opposite angle) / 2 times one and the same number. */
+/* On triangles whose smaller moment is at least a twelfth of the larger the area metric is the cotangent Laplacian:
+ * G_ij = -cot(opposite angle) / 2 times one and the same number. The sum of the moments is a third of the sum of the
+ * squared sides, their product 4/3 of the squared area. */
+static bool is_thin(double p[3][3])
+{
+    double sum = 0, a[3], b[3], cross[3], product = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) sum += pow(p[i][k] - p[(i + 1) % 3][k], 2) / 3;
+    for (int k = 0; k < 3; k++) a[k] = p[1][k] - p[0][k], b[k] = p[2][k] - p[0][k];
+    for (int k = 0; k < 3; k++) cross[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    for (int k = 0; k < 3; k++) product += cross[k] * cross[k] / 3;
+    double root = sqrt(fmax(sum * sum - 4 * product, 0));
+    return 12 * (sum - root) < sum + root;
+}
+
 static void area_metric_is_cotangents(void)
 {
     double ratio = 0;
     for (int trial = 0; trial < 50; trial++) {
         vg_head h = new_shape();
         double p[3][3];
-        for (int i = 0; i < 3; i++) {
-            for (int k = 0; k < 3; k++) p[i][k] = noise();
-            add_vertex(&h, p[i][0], p[i][1], p[i][2]);
-        }
+        do
+            for (int i = 0; i < 9; i++) p[i / 3][i % 3] = noise();
+        while (is_thin(p));
+        for (int i = 0; i < 3; i++) add_vertex(&h, p[i][0], p[i][1], p[i][2]);
         add_face(&h, 3, (uint32_t[]){0, 1, 2});
         vg_graph *g = graph_of(&h);
         vgi_metric m;
@@ -631,7 +644,7 @@ TESTS({"a turning source turns every target", rotation_passes},
       {"the polar rotation of R S is R", polar_finds_the_rotation},
       {"the polar rotation of what is no rotation is one", polar_of_what_cancels},
       {"a sheet folded flat drives a face across the crease", a_fold_is_finite},
-      {"the area metric of triangles is the cotangent Laplacian", area_metric_is_cotangents},
+      {"the area metric of triangles that are not thin is the cotangent Laplacian", area_metric_is_cotangents},
       {"by shape: a mesh onto itself is its pose", shape_onto_itself},
       {"by shape: vectors of the target at centroids of the source", shape_of_the_reference},
       {"expressions are added", expressions})

@@ -7,9 +7,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Thin faces: the smaller moment is at least THIN times the larger one, the area at least SMALL times the larger
- * moment. */
-static const double thin = 1e-4, small = 1e-3;
+/* The smaller moment of a face counts as THIN times the larger one at least: that of a rectangle twice as long as wide.
+ * A triangle may have a third of that, as half a rectangle has. The area is at least SMALL times the larger moment. */
+static const double thin = 0.25, small = 1e-3;
 
 static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t r)
 {
@@ -38,12 +38,12 @@ static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t
     }
     /* eigenvalues and the first eigenvector of [aa ab; ab bb] */
     double half = (aa + bb) / 2, spread = hypot((aa - bb) / 2, ab), angle = 0.5 * atan2(2 * ab, aa - bb);
-    double l1 = half + spread, l2 = fmax(half - spread, thin * l1), w_area = fmax(length / 2, small * l1);
-    double trace = 1 / l1 + 1 / l2;
-    m->weight = w_area * trace;
+    double l1 = half + spread, l2 = fmax(half - spread, (r == 3 ? thin / 3 : thin) * l1);
+    double w_area = fmax(length / 2, small * l1), bending = 2 / l1;
+    m->weight = w_area * bending;
     for (int which = 0; which < 2; which++) {
         double c = which ? -sin(angle) : cos(angle), s = which ? cos(angle) : sin(angle), l = which ? l2 : l1, e[3];
-        double scale = w_area * (1 / (l * l) - trace / l);
+        double scale = w_area * (1 / (l * l) - bending / l);
         for (int k = 0; k < 3; k++) e[k] = c * a[k] + s * b[k];
         m->s[0] += scale * e[0] * e[0], m->s[1] += scale * e[0] * e[1], m->s[2] += scale * e[0] * e[2];
         m->s[3] += scale * e[1] * e[1], m->s[4] += scale * e[1] * e[2], m->s[5] += scale * e[2] * e[2];
