@@ -10,7 +10,7 @@
 #include <stdlib.h>
 
 enum { KEPT = VGI_LONG_GIVEN, WATCHED = VGI_WATCHED };
-static const double margin = 0.05, lively = 0.3; /* lively: default standard deviation of random states */
+static const double lively = 0.3; /* lively: default standard deviation of random states */
 
 /* Allocate all arrays in one block. */
 static int make_rooms(vg_generator *g, vg_err *e)
@@ -149,17 +149,16 @@ static void restart_chains(vg_generator *g)
     g->begun = true;
 }
 
-/* Distance of the coordinates outside the training range, relative to its size; with `clip` they are clamped to its
- * margin. */
+/* Distance of the coordinates outside the training range, relative to its size; with `clip` they are clamped to
+ * it. */
 static double keep_in_range(const vg_generator *g, double *c, bool clip)
 {
     double sum = 0, span = vgi_network_span(g->net);
     size_t k = g->net->rank;
     for (size_t i = 0; i < k; i++) {
-        double least = g->net->range[i], most = g->net->range[k + i], more = margin * (most - least);
-        double far = c[i] - fmin(fmax(c[i], least), most);
+        double inside = fmin(fmax(c[i], g->net->range[i]), g->net->range[k + i]), far = c[i] - inside;
         sum += far * far;
-        if (clip) c[i] = fmin(fmax(c[i], least - more), most + more);
+        if (clip) c[i] = inside;
     }
     return span > 0 ? sqrt(sum) / span : 0;
 }
