@@ -45,10 +45,10 @@ static int nearest_axis(const double d[3], double firm)
     return d[best] > 0 ? best + 1 : -best - 1;
 }
 
+/* 1, 2, 3 or the negative of one as a unit vector. */
 static void axis_vector(int axis, double x[3])
 {
-    x[0] = x[1] = x[2] = 0;
-    x[(axis < 0 ? -axis : axis) - 1] = axis < 0 ? -1 : 1;
+    for (int k = 0; k < 3; k++) x[k] = (axis == k + 1) - (axis == -k - 1);
 }
 
 /* The axes that are up and left; false if they are not known. */
