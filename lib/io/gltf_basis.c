@@ -246,7 +246,8 @@ int vgi_gltf_basis_solve(const vgi_gltf_basis *b, size_t frames, double **solved
             for (size_t t = 0; t <= s; t++) gram[s * n + t] += a * weights[f * n + t];
         }
     for (size_t s = 0; s < n && r == VG_OK; s++) trace += gram[s * n + s];
-    for (size_t s = 0; s < n && r == VG_OK; s++) gram[s * n + s] += 1e-12 * trace;
+    const double ridge = trace > 0 ? 1e-12 * trace : 1; /* 0: all weights have vanished in binary32 */
+    for (size_t s = 0; s < n && r == VG_OK; s++) gram[s * n + s] += ridge;
     if (r == VG_OK && n && !vgi_spd_factor(n, gram)) r = vg_fail(e, VG_EINPUT, "the frames cannot be mixed");
     if (r == VG_OK) vgi_spd_solve(n, gram, frames, to);
     free(gram);
