@@ -70,15 +70,17 @@ static void read_again(const run *x, uint64_t frames)
     free(text);
 }
 
-/* What can be written in binary32 is, but for sums of frames that overflow there. */
+/* What can be written in binary32 is, but for sums of frames that overflow there. What was not read to its end is not
+ * compared: vertices that only a later frame tells apart would be welded. */
 static void write_run(run *x, size_t most_targets)
 {
     const vg_sink_options o = {.most_targets = most_targets, .quantize = most_targets % 2};
     vg_err e = {0};
     uint64_t n = 0;
+    int more = 0;
     demand((x->out.fd = vgi_nameless_file(&e)) >= 0);
     int r = x->format->begin(&x->written, &x->head, &o, &x->out, &e);
-    while (r == VG_OK && n < MOST_FRAMES && next(x, &e) > 0)
+    while (r == VG_OK && n < MOST_FRAMES && (more = next(x, &e)) > 0)
         if ((r = x->format->put(x->written, &x->frame, &e)) == VG_OK) n++;
     demand(r == VG_OK || r == VG_EINPUT);
     if (r < 0 || n == 0) return;
@@ -86,7 +88,7 @@ static void write_run(run *x, size_t most_targets)
     if (r == VG_EINPUT && strstr(e.message, "in binary32")) return;
     demand(r == VG_OK && vgi_output_flush(&x->out, &e) == VG_OK);
     x->format->warning(x->written);
-    read_again(x, n);
+    if (more == 0) read_again(x, n);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
