@@ -20,80 +20,13 @@ static void face_normal(const vg_mesh *m, size_t f, const double *pose, double n
 
 /* ---- smooth surfaces ---- */
 
-/* An edge of a face: from corner c to the next one of its face, between the vertices low < high. */
-typedef struct side {
-    uint32_t low, high, face, at_low, at_high; /* at_low, at_high: the corners there */
-} side;
-
-/* Order of sides with the same low vertex. */
-static bool is_before(const side *s, const side *t)
+static void unite_corners(uint32_t *parent, const vgi_smoothing *k)
 {
-    return s->high != t->high ? s->high < t->high : s->face < t->face;
-}
-
-static void sort_few(side *s, size_t n)
-{
-    for (size_t i = 1; i < n; i++) {
-        const side moving = s[i];
-        size_t at = i;
-        for (; at > 0 && is_before(&moving, &s[at - 1]); at--) s[at] = s[at - 1];
-        s[at] = moving;
-    }
-}
-
-static int by_high(const void *a, const void *b)
-{
-    return is_before(a, b) ? -1 : is_before(b, a);
-}
-
-enum { FEW = 32 };
-
-/* Sides of faces, ordered by low, high and face. ends: where those of a low vertex start, then (nv + 1) where they end. */
-static size_t list_sides(const vg_mesh *m, size_t *ends, side *to)
-{
-    memset(ends, 0, (m->nv + 1) * sizeof *ends);
-    for (int filling = 0; filling < 2; filling++) {
-        for (size_t f = 0; f < m->nf; f++) {
-            const uint32_t first = m->start[f], size = (uint32_t)vgi_face_size(m, f);
-            for (uint32_t i = 0; i < size && size > 2; i++) {
-                const uint32_t c = first + i, d = i + 1 < size ? c + 1 : first, v = m->vert[c], w = m->vert[d];
-                if (!filling) ends[(v < w ? v : w) + 1]++;
-                else if (v < w) to[ends[v]++] = (side){v, w, (uint32_t)f, c, d};
-                else to[ends[w]++] = (side){w, v, (uint32_t)f, d, c};
-            }
-        }
-        for (size_t v = 0; v < m->nv && !filling; v++) ends[v + 1] += ends[v];
-    }
-    for (size_t v = 0; v < m->nv; v++) {
-        const size_t first = v ? ends[v - 1] : 0, n = ends[v] - first;
-        if (n <= FEW) sort_few(to + first, n);
-        else qsort(to + first, n, sizeof *to, by_high);
-    }
-    return m->nv ? ends[m->nv - 1] : 0;
-}
-
-/* The smaller number is kept, so that groups do not depend on the order of edges. */
-static void join_corners(uint32_t *parent, uint32_t c, uint32_t d)
-{
-    c = vgi_sets_find(parent, c), d = vgi_sets_find(parent, d);
-    if (c < d) parent[d] = c;
-    else parent[c] = d;
-}
-
-static bool is_smooth(const side *s, const side *t, const int64_t *smoothing, const double *normal)
-{
-    if (smoothing[s->face] != smoothing[t->face]) return false;
-    if (smoothing[s->face] != VGI_SMOOTH_BY_ANGLE) return smoothing[s->face] != 0;
-    return vgi_dot(normal + 3 * (size_t)s->face, normal + 3 * (size_t)t->face) > vgi_least_cosine;
-}
-
-static void unite_corners(uint32_t *parent, const side *sides, size_t n, const int64_t *smoothing, const double *normal)
-{
-    for (size_t i = 1; i < n; i++) {
-        const side *s = &sides[i - 1], *t = &sides[i];
-        if (s->low != t->low || s->high != t->high || !is_smooth(s, t, smoothing, normal)) continue;
-        join_corners(parent, s->at_low, t->at_low);
-        join_corners(parent, s->at_high, t->at_high);
+    for (size_t i = 1; i < k->nsides; i++) {
+        const vgi_side *s = &k->sides[i - 1], *t = &k->sides[i];
+        if (!vgi_on_one_edge(s, t) || !vgi_is_smooth(k, s, t)) continue;
+        (void)vgi_sets_join(parent, s->at_low, t->at_low);
+        (void)vgi_sets_join(parent, s->at_high, t->at_high);
     }
 }
 
@@ -112,27 +45,19 @@ int vgi_gltf_normals_make(vgi_gltf_normals *x, const vg_mesh *m, const vg_attrib
 {
     const size_t corners = vg_mesh_corners(m);
     *x = (vgi_gltf_normals){.mesh = m};
+    vgi_smoothing smoothing;
+    int r = vgi_smoothing_make(&smoothing, m, a, reference, e);
     uint32_t *parent = vgi_array_raw(corners, sizeof *parent, e);
-    side *sides = vgi_array_raw(corners, sizeof *sides, e);
-    size_t *ends = vgi_array_raw(m->nv + 1, sizeof *ends, e);
-    int64_t *smoothing = vgi_array_raw(m->nf, sizeof *smoothing, e);
-    double *normal = vgi_array_raw(m->nf, 3 * sizeof *normal, e);
     x->corner = vgi_array_raw(corners, sizeof *x->corner, e);
-    int r = parent && sides && ends && smoothing && normal && x->corner ? VG_OK : VG_ENOMEM;
-
+    if (!parent || !x->corner) r = VG_ENOMEM;
     if (r == VG_OK) {
-        vgi_smoothing_of(m, a, smoothing);
-        for (uint32_t c = 0; c < corners; c++) parent[c] = c;
-        for (size_t f = 0; f < m->nf; f++) face_normal(m, f, reference, normal + 3 * f);
-        unite_corners(parent, sides, list_sides(m, ends, sides), smoothing, normal);
+        vgi_sets_init(parent, corners);
+        unite_corners(parent, &smoothing);
         number_groups(x, parent);
         if (!(x->sum = vgi_array(x->ngroups, 3 * sizeof *x->sum, e))) r = VG_ENOMEM;
     }
+    vgi_smoothing_clear(&smoothing);
     free(parent);
-    free(sides);
-    free(ends);
-    free(smoothing);
-    free(normal);
     return r;
 }
 

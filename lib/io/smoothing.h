@@ -5,12 +5,26 @@
 
 #include "io/io.h"
 
-/* Faces that meet at 60 degrees or more form an edge where nothing else is said. */
-static const double vgi_least_cosine = 0.5;
+/* An edge of a face, between the vertices low < high. */
+typedef struct vgi_side {
+    uint32_t low, high, face, at_low, at_high; /* at_low, at_high: the corners there */
+} vgi_side;
 
-/* Smoothing of each face: SMOOTH_BY_ANGLE without labels; 0: flat; otherwise a number that neighbours must share. */
-enum { VGI_SMOOTH_BY_ANGLE = -1 };
-void vgi_smoothing_of(const vg_mesh *m, const vg_attributes *a, int64_t *of);
+/* Where a surface is smooth: by the smoothing groups of its labels; where there are none, by the angles of its faces. */
+typedef struct vgi_smoothing {
+    int64_t *group;  /* of each face: -1: by angle; 0: flat; otherwise a number that neighbours share */
+    double *normal;  /* of each face: of unit length, or 0 */
+    vgi_side *sides; /* of faces with three corners or more; those of one edge follow one another */
+    size_t nsides;
+} vgi_smoothing;
+
+/* vgi_smoothing_make: a may be NULL. The caller clears it in any case. */
+int vgi_smoothing_make(vgi_smoothing *k, const vg_mesh *m, const vg_attributes *a, const double *reference,
+                       vg_err *e) VG_MUST_CHECK;
+void vgi_smoothing_clear(vgi_smoothing *k);
+bool vgi_on_one_edge(const vgi_side *s, const vgi_side *t);
+/* vgi_is_smooth: whether two faces form one surface at the edge of these sides. */
+bool vgi_is_smooth(const vgi_smoothing *k, const vgi_side *s, const vgi_side *t);
 
 /* vgi_smooth_by_normals: make smoothing groups that are sharp where normals differ, in place of those of the body, unless these
  * are sharp at the same edges. normal: three numbers for each corner, of unit length; any for faces of two corners. */
