@@ -163,25 +163,43 @@ static void normal_in(const vgi_gltf_character *c, size_t f, const double n[3], 
     vgi_make_unit(to);
 }
 
-static int read_normals(vgi_gltf_character *c, vg_err *e)
+/* Nodes and skins transform tangents by M itself. */
+static void tangent_out(const vgi_gltf_character *c, size_t f, const double t[3], double to[3])
 {
-    const vgi_gltf_scene *x = &c->scene;
-    for (size_t i = 0; i < x->nparts; i++) {
-        const vgi_gltf_part *p = &x->parts[i];
-        const vgi_json *ref = vgi_json_get(p->attributes, "NORMAL");
-        vgi_accessor a;
-        if (!ref || vgi_gltf_accessor(&x->g, ref, 3, p->count, "normals", &a, NULL) < 0) continue;
-        if (!c->normal && (!(c->normal = vgi_array(c->n, 3 * sizeof *c->normal, e)) ||
-                           !(c->world_normal = vgi_array(c->n, 3 * sizeof *c->world_normal, e))))
-            return VG_ENOMEM;
-        for (size_t v = 0; v < p->count; v++) {
-            const size_t f = p->first + v;
-            double n[3];
-            vgi_accessor_get(&a, v, n);
-            if (!vgi_finite(n, 3)) continue;
-            for (int k = 0; k < 3; k++) c->normal[3 * f + k] = (float)n[k];
-            normal_out(c, f, n, c->world_normal + 3 * f);
-        }
+    linear(c->out + 12 * f, t, to);
+    vgi_make_unit(to);
+}
+
+static void tangent_in(const vgi_gltf_character *c, size_t f, const double t[3], double to[3])
+{
+    linear(c->in + 12 * f, t, to);
+    vgi_make_unit(to);
+}
+
+/* Normals or tangents: an attribute of so many numbers, and where its directions are kept. */
+typedef struct directions {
+    const char *attribute, *what;
+    size_t numbers;
+    float **local;  /* in the space of the vertices, as the file has them */
+    double **world;
+    void (*out)(const vgi_gltf_character *c, size_t f, const double x[3], double to[3]);
+} directions;
+
+static int read_part(vgi_gltf_character *c, const vgi_gltf_part *p, const directions *k, vg_err *e)
+{
+    const vgi_json *ref = vgi_json_get(p->attributes, k->attribute);
+    vgi_accessor a;
+    if (!ref || vgi_gltf_accessor(&c->scene.g, ref, k->numbers, p->count, k->what, &a, NULL) < 0) return VG_OK;
+    if (!*k->local && (!(*k->local = vgi_array(c->n, 3 * sizeof **k->local, e)) ||
+                       !(*k->world = vgi_array(c->n, 3 * sizeof **k->world, e))))
+        return VG_ENOMEM;
+    for (size_t v = 0; v < p->count; v++) {
+        const size_t f = p->first + v;
+        double x[4];
+        vgi_accessor_get(&a, v, x);
+        if (!vgi_finite(x, 3)) continue;
+        for (int i = 0; i < 3; i++) (*k->local)[3 * f + i] = (float)x[i];
+        k->out(c, f, x, *k->world + 3 * f);
     }
     return VG_OK;
 }
@@ -202,30 +220,16 @@ bool vgi_gltf_needs_tangents(const vgi_gltf_scene *x, size_t part)
     return false;
 }
 
-/* Nodes and skins transform tangents by M itself. */
-static int read_tangents(vgi_gltf_character *c, vg_err *e)
+static int read_directions(vgi_gltf_character *c, vg_err *e)
 {
-    const vgi_gltf_scene *x = &c->scene;
-    for (size_t i = 0; i < x->nparts; i++) {
-        const vgi_gltf_part *p = &x->parts[i];
-        vgi_accessor a;
-        if (!vgi_gltf_needs_tangents(x, i) ||
-            vgi_gltf_accessor(&x->g, vgi_json_get(p->attributes, "TANGENT"), 4, p->count, "tangents", &a, NULL) < 0)
-            continue;
-        if (!c->tangent && (!(c->tangent = vgi_array(c->n, 3 * sizeof *c->tangent, e)) ||
-                            !(c->world_tangent = vgi_array(c->n, 3 * sizeof *c->world_tangent, e))))
-            return VG_ENOMEM;
-        for (size_t v = 0; v < p->count; v++) {
-            const size_t f = p->first + v;
-            double t[4];
-            vgi_accessor_get(&a, v, t);
-            if (!vgi_finite(t, 3)) continue;
-            for (int k = 0; k < 3; k++) c->tangent[3 * f + k] = (float)t[k];
-            linear(c->out + 12 * f, t, c->world_tangent + 3 * f);
-            vgi_make_unit(c->world_tangent + 3 * f);
-        }
+    const directions normals = {"NORMAL", "normals", 3, &c->normal, &c->world_normal, normal_out};
+    const directions tangents = {"TANGENT", "tangents", 4, &c->tangent, &c->world_tangent, tangent_out};
+    int r = VG_OK;
+    for (size_t i = 0; i < c->scene.nparts && r == VG_OK; i++) {
+        r = read_part(c, &c->scene.parts[i], &normals, e);
+        if (r == VG_OK && vgi_gltf_needs_tangents(&c->scene, i)) r = read_part(c, &c->scene.parts[i], &tangents, e);
     }
-    return VG_OK;
+    return r;
 }
 
 /* Lists of the file's vertices that are one vertex of the mesh. */
@@ -308,23 +312,15 @@ static bool is_still(const double m[9])
     return m[1] == m[3] && m[2] == m[6] && m[5] == m[7] && m[0] >= 0 && m[4] >= 0 && m[8] >= 0;
 }
 
-/* Change of a normal in another pose, in the space of its mesh. */
-static void turn_normal(const vgi_gltf_character *c, size_t f, const double r[9], float to[3])
+/* Change of a direction of vertex f when the world turns by r, in the space of its mesh. */
+static void turn_direction(const vgi_gltf_character *c, size_t f, const double r[9], const double *world, const float *local,
+                           void (*in)(const vgi_gltf_character *, size_t, const double *, double *), float *to)
 {
     double turned[3], now[3];
-    for (int i = 0; i < 3; i++) turned[i] = vgi_dot(r + 3 * i, c->world_normal + 3 * f);
-    normal_in(c, f, turned, now);
-    for (int k = 0; k < 3; k++) to[k] = (float)(now[k] - c->normal[3 * f + k]);
-}
-
-static void turn_tangent(const vgi_gltf_character *c, size_t f, const double r[9], float to[3])
-{
-    double turned[3], now[3];
-    if (vgi_length(c->world_tangent + 3 * f) == 0) return;
-    for (int i = 0; i < 3; i++) turned[i] = vgi_dot(r + 3 * i, c->world_tangent + 3 * f);
-    linear(c->in + 12 * f, turned, now);
-    vgi_make_unit(now);
-    for (int k = 0; k < 3; k++) to[k] = (float)(now[k] - c->tangent[3 * f + k]);
+    if (vgi_length(world + 3 * f) == 0) return;
+    for (int i = 0; i < 3; i++) turned[i] = vgi_dot(r + 3 * i, world + 3 * f);
+    in(c, f, turned, now);
+    for (size_t k = 0; k < 3; k++) to[3 * f + k] = (float)(now[k] - local[3 * f + k]);
 }
 
 void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *normals, float *tangents)
@@ -337,8 +333,8 @@ void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *
         double r[9];
         if (!m || is_still(m)) continue;
         vgi_fit_rotation(m, r);
-        turn_normal(c, f, r, normals + 3 * f);
-        if (tangents) turn_tangent(c, f, r, tangents + 3 * f);
+        turn_direction(c, f, r, c->world_normal, c->normal, normal_in, normals);
+        if (tangents) turn_direction(c, f, r, c->world_tangent, c->tangent, tangent_in, tangents);
     }
 }
 
@@ -368,8 +364,7 @@ static int turn_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 
 static int find_normals(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 {
-    int r = read_normals(c, e);
-    if (r == VG_OK) r = read_tangents(c, e);
+    int r = read_directions(c, e);
     if (r < 0 || !c->normal) return r;
     if ((r = group_normals(c, e)) < 0) return r;
     c->rest = vgi_array(c->faces.mesh.nf, sizeof *c->rest, e), c->turn = vgi_array(c->ngroups, 9 * sizeof *c->turn, e);
@@ -434,7 +429,8 @@ int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 
 void vgi_gltf_character_clear(vgi_gltf_character *c)
 {
-    void *const arrays[] = {c->out, c->in, c->base, c->normal, c->world_normal, c->tangent, c->world_tangent, c->skinned, c->group, c->rest, c->turn};
+    void *const arrays[] = {c->out,     c->in,            c->base,    c->normal, c->world_normal,
+                            c->tangent, c->world_tangent, c->skinned, c->group,  c->rest, c->turn};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     vg_mesh_clear(&c->faces.mesh);
     vgi_gltf_scene_clear(&c->scene);
