@@ -469,14 +469,11 @@ static bool report(const vgi_gltf_writing *w, char *to, size_t room)
 {
     const vgi_gltf_morphs *x = w->own;
     const double d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
-    if (w->as_it_was) {
-        snprintf(to, room, "what moves is as it was in the GLB that was read");
-        return false;
-    }
-    int n = w->whole ? snprintf(to, room, "what moves is as it was in the GLB that was read")
+    int n = w->whole                  ? snprintf(to, room, "what moves is as it was in the GLB that was read")
             : w->still && !x->targets ? snprintf(to, room, "no morph targets")
-                                    : snprintf(to, room, "%zu morph target%s for %zu frame%s", x->targets,
-                                               x->targets == 1 ? "" : "s", w->frames, w->frames == 1 ? "" : "s");
+                                      : snprintf(to, room, "%zu morph target%s for %zu frame%s", x->targets,
+                                                 x->targets == 1 ? "" : "s", w->frames, w->frames == 1 ? "" : "s");
+    if (w->as_it_was) return false;
     if (x->chosen && !x->quantize) {
         snprintf(to + n, room - (size_t)n, ", positions as they are in binary32");
         return false;

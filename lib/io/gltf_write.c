@@ -110,9 +110,13 @@ static void close_whole(vgi_gltf_writing *w)
 /* Keep it if the frames are all of it. shapes: no animation is wanted. */
 static void decide_whole(vgi_gltf_writing *w)
 {
-    const bool fits = w->whole && vgi_gltf_whole_end(w->whole);
-    const bool moves = fits && w->whole->content == VGI_GLTF_CLIPS;
-    if (!fits || (w->quantized && w->whole->content == VGI_GLTF_SHAPES) || (moves && (w->shapes || (w->clip && vgi_gltf_whole_clips(w->whole) > 1)))) close_whole(w);
+    if (!w->whole) return;
+    const vgi_gltf_content content = w->whole->content;
+    const bool renamed = w->clip && vgi_gltf_whole_clips(w->whole) > 1;
+    bool keep = vgi_gltf_whole_end(w->whole);
+    if (content == VGI_GLTF_SHAPES && w->quantized) keep = false; /* they are rounded as morph targets */
+    if (content == VGI_GLTF_CLIPS && (w->shapes || renamed)) keep = false;
+    if (!keep) close_whole(w);
     if (w->whole) w->still = true, w->times_lost = false;
     w->as_it_was = w->whole && !w->quantized;
 }
