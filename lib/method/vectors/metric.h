@@ -2,8 +2,8 @@
  *
  * The energy of a face is tr((X - W*) G (X - W*)') with G = weight (I - 11'/r) + R' S R, R the 3 x r reference
  * vectors in the face's plane. Uniform: weight 1, S 0, the projector of the printed energy. Area: the metric of the
- * surface, on triangles that are not thin the cotangent Laplacian. G is positive semidefinite and its null space contains translations
- * only, so that consistent vectors are reproduced exactly for any weights.
+ * surface, on triangles that are not thin the cotangent Laplacian. G is positive semidefinite and its null space
+ * contains translations only, so that consistent vectors are reproduced exactly for any weights.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_METRIC_H
 #define VG_METRIC_H
