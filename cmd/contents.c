@@ -55,7 +55,7 @@ static void note_animation(contents *c, const vg_frame *f)
     if (n && last && number == last->frames + 1 && strlen(last->name) == n && !memcmp(last->name, f->name, n)) {
         last->frames++;
         last->last_time = time;
-    } else if (n && number == 1) {
+    } else if (vg_frame_begins(f->name)) {
         c->animations = cli_resize(c->animations, c->nanimations + 1, sizeof *c->animations, "the names of animations");
         last = &c->animations[c->nanimations++];
         *last = (animation){cli_copy_text(f->name, "the names of animations"), 1, time, time};

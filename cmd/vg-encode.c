@@ -177,8 +177,7 @@ static vg_frame *to_vectors(work *w, vg_frame *in)
 /* A file of several animations counts each from 0: "Run.0001" is earlier than the frame before it. */
 static bool begins_animation(const work *w, const vg_frame *f)
 {
-    uint64_t number;
-    return f->has_time && f->time <= w->last_time && vg_frame_stem(f->name, &number) && number == 1;
+    return f->has_time && f->time <= w->last_time && vg_frame_begins(f->name);
 }
 
 static void encode_batch(void *context, size_t n, vg_frame *in)

@@ -13,11 +13,9 @@ static bool same_stem(const char *a, const char *b, size_t n)
     return n && vg_frame_stem(a, &number) == n && vg_frame_stem(b, &number) == n && !memcmp(a, b, n);
 }
 
-/* Whether frame i starts an animation, by its name. Numbers count from 1. */
 static bool begins(const vgi_gltf_writing *w, size_t i)
 {
-    uint64_t number;
-    return i == 0 || (vg_frame_stem(w->names.at[i], &number) && number == 1);
+    return i == 0 || vg_frame_begins(w->names.at[i]);
 }
 
 /* Whether the names number the frames of each animation from 1 without gaps, with more than one frame each. */

@@ -140,8 +140,15 @@ size_t vg_frame_stem(const char *name, uint64_t *number)
     size_t n = strlen(name), end = n;
     *number = 0;
     while (n > 0 && name[n - 1] >= '0' && name[n - 1] <= '9') n--;
-    for (size_t i = n; i < end; i++) *number = 10 * *number + (uint64_t)(name[i] - '0');
+    for (size_t i = n; i < end; i++) /* a number of 19 digits and more is some large one */
+        *number = (*number < UINT64_MAX / 10 ? 10 * *number : UINT64_MAX / 10) + (uint64_t)(name[i] - '0');
     return n > 1 && n < end && name[n - 1] == '.' ? n - 1 : 0;
+}
+
+bool vg_frame_begins(const char *name)
+{
+    uint64_t number;
+    return vg_frame_stem(name, &number) && number == 1;
 }
 
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e)

@@ -224,6 +224,8 @@ enum { VG_FPS = 24 };
 /* vg_frame_stem: a frame called "Walk.0001" is number 1 of the animation "Walk": the length of "Walk". 0: the name has no
  * such form; number is then of no meaning. */
 size_t vg_frame_stem(const char *name, uint64_t *number);
+/* vg_frame_begins: whether a name is that of an animation's first frame: number 1, as frames of an animation count from 1. */
+bool vg_frame_begins(const char *name);
 
 /* vg_frame_channel: the channel of this name; NULL: there is none. */
 vg_channel *vg_frame_channel(const vg_frame *f, const char *name);

@@ -446,6 +446,21 @@ static void test_channels(void)
     vg_head_clear(&h);
 }
 
+static void test_names(void)
+{
+    static const struct {
+        const char *name;
+        size_t stem;
+        bool begins;
+    } all[] = {{"Walk.0001", 4, true},  {"Walk.1", 4, true},   {"a.b.01", 3, true}, {"Walk.0002", 4, false}, {"Walk.0000", 4, false},
+               {"Walk.0011", 4, false}, {"Walk0001", 0, false}, {"0001", 0, false},  {".0001", 0, false},     {"Walk.", 0, false},
+               {"Walk.0001a", 0, false}, {"", 0, false},       {"Walk.18446744073709551617", 4, false}}; /* 2^64 + 1 */
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        uint64_t number;
+        CHECK(vg_frame_stem(all[i].name, &number) == all[i].stem && vg_frame_begins(all[i].name) == all[i].begins);
+    }
+}
+
 static void test_kinds(void)
 {
     CHECK(vg_kind_width(VG_VERTICES) == 3 && vg_kind_width(VG_VECTORS) == 3);
@@ -469,6 +484,6 @@ TESTS({"which meshes are valid", test_check},
       {"which meshes are the same", test_same}, {"no faces", test_empty}, {"components", test_components},
       {"diagonal and centroid", test_size_and_centre}, {"vectors sum to 0, and move as the mesh does", test_vectors},
       {"the graph has faces, selection and links", test_graph}, {"a copy is whole and its own", test_copy},
-      {"provenance has its parents", test_trace}, {"frames are reused", test_frame}, {"kinds", test_kinds},
+      {"provenance has its parents", test_trace}, {"frames are reused", test_frame}, {"names of frames", test_names}, {"kinds", test_kinds},
       {"channels", test_channels},
       {"one thing of a head goes over to another", test_take})
