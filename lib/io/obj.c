@@ -1,8 +1,8 @@
 /* obj.c: reads Wavefront OBJ: vertices and their colours, texture coordinates, faces, lines, and the names of groups and materials.
- * Normals (they change with the pose), points and free-form surfaces are ignored; material files are
- * read in mtl.c. Writing is in obj_write.c.
+ * Normals are read only for obj_normals.c (they change with the pose); points and free-form surfaces are ignored; material
+ * files are read in mtl.c. Writing is in obj_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/io.h"
+#include "io/smoothing.h"
 #include "model/colour.h"
 
 #include <math.h>
@@ -17,6 +17,7 @@ struct reading {
     const char *subject;
     vg_err *e;
     vg_model *m;
+    vgi_obj_normals *normals; /* NULL: normals are skipped */
     size_t vertices_cap, start_cap, vert_cap, tex_cap, labels_cap, colours_cap;
     size_t corners;
     bool textured;      /* corner_tex exists, with capacity vert_cap */
@@ -232,7 +233,7 @@ static const char *read_vertex(struct reading *in, const char *p)
 }
 
 /* One to three finite numbers and nothing else; returns their number, or 0. */
-static uint32_t take_tex(const struct reading *in, const char *p, double x[3])
+static uint32_t take_numbers(const struct reading *in, const char *p, double x[3])
 {
     for (uint32_t n = 0;; n++) {
         const char *word = skip_blanks(in, p);
@@ -256,9 +257,19 @@ static const char *read_tex(struct reading *in, const char *p)
         return NULL;
     double *x = a->tex + 3 * a->ntex++;
     x[0] = x[1] = x[2] = 0;
-    uint32_t n = take_tex(in, p, x);
+    uint32_t n = take_numbers(in, p, x);
     if (n == 0) in->bad_tex++, x[0] = NAN;
     if (n > a->tex_dim) a->tex_dim = n;
+    return skip_words(in, p);
+}
+
+/* A malformed normal is 0. */
+static const char *read_normal(struct reading *in, const char *p)
+{
+    vgi_obj_normals *to = in->normals;
+    if (vgi_grow(&to->normal, &to->cap, to->n + 1, 3 * sizeof *to->normal, in->e) < 0) return NULL;
+    double *x = to->normal + 3 * to->n++;
+    if (take_numbers(in, p, x) != 3) memset(x, 0, 3 * sizeof *x);
     return skip_words(in, p);
 }
 
@@ -308,17 +319,31 @@ static const char *read_tex_index(const struct reading *in, const char *p, uint3
     return s;
 }
 
+/* The index of a normal at p, which may be empty, as read_index gives it; UINT32_MAX: none, or out of range. */
+static inline const char *read_normal_index(const struct reading *in, const char *p, uint32_t *index)
+{
+    int64_t x = 0;
+    if (in->normals && vgi_parse_int(p, in->end, &x)) {
+        if (x < 0) x += (int64_t)in->normals->n + 1;
+        if (x > 0 && x < UINT32_MAX) *index = (uint32_t)(x - 1);
+    }
+    if (p < in->end && *p == '-') p++;
+    while (p < in->end && (unsigned char)(*p - '0') < 10) p++;
+    return p;
+}
+
 static int grow_corners(struct reading *in, size_t need)
 {
     vg_model *m = in->m;
-    size_t old_cap = in->vert_cap, tex_cap = old_cap;
+    size_t old_cap = in->vert_cap, tex_cap = old_cap, normal_cap = old_cap;
     if (need >= UINT32_MAX)
         return vg_fail(in->e, VG_EINPUT, "%s has too many corners of faces (the limit is 2^32 - 2)", in->subject);
     if (vgi_grow(&m->mesh.vert, &in->vert_cap, need, sizeof *m->mesh.vert, in->e) < 0) return VG_ENOMEM;
     if (in->textured &&
         vgi_grow(&m->attributes.corner_tex, &tex_cap, in->vert_cap, sizeof *m->attributes.corner_tex, in->e) < 0)
         return VG_ENOMEM;
-    return VG_OK;
+    if (!in->normals) return VG_OK;
+    return vgi_grow(&in->normals->corner, &normal_cap, in->vert_cap, sizeof *in->normals->corner, in->e);
 }
 
 /* Give every corner from now on a texture coordinate, or UINT32_MAX. */
@@ -332,26 +357,23 @@ static int start_texture(struct reading *in)
     return VG_OK;
 }
 
-/* One corner: v, v/vt, v//vn or v/vt/vn, where vt and vn may be empty. The normal is read and dropped. */
+/* One corner: v, v/vt, v//vn or v/vt/vn, where vt and vn may be empty. */
 static inline const char *read_corner(struct reading *in, const char *p)
 {
     vg_model *m = in->m;
     if (in->corners >= in->vert_cap && grow_corners(in, in->corners + 1) < 0) return NULL;
     p = read_index(in, p, m->mesh.nv, &m->mesh.vert[in->corners]);
     if (!p) return NULL;
-    uint32_t tex = UINT32_MAX;
+    uint32_t tex = UINT32_MAX, normal = UINT32_MAX;
     if (p < in->end && *p == '/') {
         p++;
         if (p < in->end && (unsigned char)*p > ' ' && *p != '/' && *p != '\\') {
             p = read_tex_index(in, p, &tex);
             if (!p || (!in->textured && start_texture(in) < 0)) return NULL;
         }
-        if (p < in->end && *p == '/') {
-            p++;
-            if (p < in->end && *p == '-') p++;
-            while (p < in->end && (unsigned char)(*p - '0') < 10) p++;
-        }
+        if (p < in->end && *p == '/') p = read_normal_index(in, p + 1, &normal);
     }
+    if (in->normals) in->normals->corner[in->corners] = normal;
     if (in->textured) m->attributes.corner_tex[in->corners] = tex;
     in->corners++;
     return p;
@@ -368,7 +390,7 @@ static inline int end_face(struct reading *in, size_t first, size_t size)
     return VG_OK;
 }
 
-/* Make a polyline of the n >= 2 corners from `first` on: every two of them are a face. */
+/* Make a polyline of the n >= 2 corners from `first` on: every two of them are a face. They have no normals. */
 static int end_line(struct reading *in, size_t first, size_t n)
 {
     size_t segments = n - 1;
@@ -466,6 +488,7 @@ static const char *read_statement(struct reading *in, const char *p)
     case 'v':
         if (ends_word(in, p + 1)) return read_vertex(in, p + 1);
         if (is_word(in, p, "vt")) return read_tex(in, p + 2);
+        if (in->normals && is_word(in, p, "vn")) return read_normal(in, p + 2);
         break;
     case 'f':
         if (ends_word(in, p + 1)) return read_face(in, p + 1, false);
@@ -610,6 +633,14 @@ int vgi_obj_read(vg_model *m, const char *data, size_t n, const char *subject, v
     r = check_vertices(&in);
     if (r == VG_OK) r = finish_colours(&in);
     return r == VG_OK ? finish_tex(&in) : r;
+}
+
+int vgi_obj_read_normals(vgi_obj_normals *to, vg_model *m, const char *data, size_t n, vg_err *e)
+{
+    vg_err own;
+    struct reading in = start_reading(m, data, n, "OBJ", e ? e : &own);
+    in.normals = to;
+    return read_statements(&in);
 }
 
 static int read_obj(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)

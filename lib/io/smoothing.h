@@ -30,9 +30,21 @@ bool vgi_is_smooth(const vgi_smoothing *k, const vgi_side *s, const vgi_side *t)
  * are sharp at the same edges. normal: three numbers for each corner, of unit length; any for faces of two corners. */
 int vgi_smooth_by_normals(vg_body *b, const double *normal, vg_err *e) VG_MUST_CHECK;
 
+/* Normals of an OBJ, in the order of the file. */
+typedef struct vgi_obj_normals {
+    double *normal;   /* n x 3, as given; 0: malformed */
+    uint32_t *corner; /* for each corner the index of its normal, >= n: none; undefined in faces of two corners */
+    size_t n, cap;
+} vgi_obj_normals;
+
+/* ---- obj.c ---- */
+/* vgi_obj_read_normals: read normals and faces of a text that vgi_obj_read has read without error. The caller clears `to` and m
+ * in any case. VG_ENOMEM. */
+int vgi_obj_read_normals(vgi_obj_normals *to, vg_model *m, const char *data, size_t n, vg_err *e) VG_MUST_CHECK;
+
 /* ---- obj_normals.c ---- */
 /* vgi_obj_take_smoothing: the same by the normals (vn) of this text, if it is an OBJ that has one for each corner of the body's
- * faces. */
+ * faces. VG_ENOMEM. */
 int vgi_obj_take_smoothing(vg_body *b, const char *data, size_t n, vg_err *e) VG_MUST_CHECK;
 
 #endif

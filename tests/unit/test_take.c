@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "test.h"
 
-#include "io/io.h"
+#include "io/smoothing.h"
 #include "io/polygon.h"
 #include "numeric/face.h"
 
@@ -50,6 +50,7 @@ static void check_all(const taken *all, size_t n)
 }
 #define CHECK_ALL(all) check_all(all, sizeof all / sizeof *all)
 
+#define BENT "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 #define OBJ4 "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 #define OFF4(faces) "OFF\n4 " faces " 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
 #define PLY4(faces) \
@@ -253,7 +254,48 @@ static void lines_join_over_blanks(void)
     CHECK_ALL(all);
 }
 
+/* The smoothing groups that a text gets by its normals: "s GROUP" before faces. Read as programs do: the mesh, then these. */
+static const char *groups_of(const char *data)
+{
+    static char text[200];
+    vg_model m;
+    vg_err e = {0};
+    size_t at = 0;
+    *text = 0;
+    if (vg_model_read(&m, data, strlen(data), "obj", "a.obj", &e) < 0) return "not read";
+    vg_body b = {.mesh = m.mesh, .attributes = m.attributes, .reference = m.vertices};
+    CHECK(vgi_obj_take_smoothing(&b, data, strlen(data), &e) == VG_OK);
+    for (size_t i = 0; i < b.attributes.nlabels; i++)
+        at += (size_t)snprintf(text + at, sizeof text - at, "%s%zu: s %s", i ? ", " : "", b.attributes.labels[i].face,
+                               b.attributes.labels[i].text);
+    m.attributes = b.attributes;
+    vg_model_clear(&m);
+    return text;
+}
+
+/* Two triangles at a right angle, sharp by the angle. One normal for both makes them smooth, as does one that is 0.5 degrees off
+ * (files round); one that is 2 degrees off, one that is missing, malformed or 0 does not. */
+static void normals_make_groups(void)
+{
+    static const char *const all[][2] = {
+        {BENT "vn 0 1 1\nf 1//1 2//1 3//1\nf 2//1 1//1 4//1\n", "0: s 1"},
+        {BENT "vn 0 1 1\nvn 0 1 1.0176\nf 1//1 2//1 3//1\nf 2//2 1//2 4//2\n", "0: s 1"},
+        {BENT "vn 0 1 1\nvn 0 1 1.0725\nf 1//1 2//1 3//1\nf 2//2 1//2 4//2\n", ""},
+        {BENT "vn 0 1 1\nf 1//1 2//1 3//1\nf 2//1 1//1 4\n", ""},
+        {BENT "vn 0 1 1\nf 1//1 2//1 3//1\nf 2//1 1//1 4//2\n", ""},
+        {BENT "vn 0 1 1\nvn 0 1\nf 1//1 2//1 3//1\nf 2//1 1//1 4//2\n", ""},
+        {BENT "vn 0 0 0\nf 1//1 2//1 3//1\nf 2//1 1//1 4//1\n", ""},
+        /* counted back; with texture; lines, which have none; joined lines; lines that end in CR */
+        {BENT "vn 1 0 0\nvn 0 1 1\nf 1//-1 2//-1 3//-1\nvn 0 2 2\nf 2//-1 1//-2 4//3\n", "0: s 1"},
+        {BENT "vn 0 1 1\nvt 0 0\nl 1 2 3 4\nf 1/1/1 2/1/1 3/1/1\nf 2/1/1 1//1 4//1\n", "0: s off, 3: s 1"},
+        {BENT "vn 0 \\\n1 1\nf 1//1 \\\n2//1 3//1\nf 2//1 1//1 4//1\n", "0: s 1"},
+        {"v 0 0 0\rv 1 0 0\rv 0 1 0\rv 0 0 1\rvn 0 1 1\rf 1//1 2//1 3//1\rf 2//1 1//1 4//1\r", "0: s 1"},
+    };
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) CHECK_TEXT(groups_of(all[i][0]), all[i][1]);
+}
+
 #define T(name) {#name, name}
 TESTS(T(degenerate_faces_go_in_every_format_alike), T(labels_and_texture_move_along), T(holes_are_cut_open),
       T(bad_texture_loses_itself), T(off_is_a_sequence_of_words), T(ply_takes_strips_counts_and_old_headers),
-      T(stl_passes_over_what_it_does_not_need), T(marks_of_text_are_no_content), T(lines_join_over_blanks))
+      T(stl_passes_over_what_it_does_not_need), T(marks_of_text_are_no_content), T(lines_join_over_blanks),
+      T(normals_make_groups))
