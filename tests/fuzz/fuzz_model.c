@@ -1,7 +1,7 @@
-/* fuzz_model.c: mesh files: whatever is read is a valid mesh, and comes back the same from every format.
- * Leaves out archives and the stream.
+/* fuzz_model.c: mesh files: whatever is read is a valid mesh, comes back the same from every format, and takes smoothing groups
+ * from the normals of an OBJ. Leaves out archives and the stream.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "vg.h"
+#include "io/smoothing.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -61,6 +61,19 @@ static void there_and_back(const vg_model *m, const char *format, bool full)
     vg_bytes_clear(&again);
 }
 
+/* Groups by normals take the place of those of the labels, in the order of the faces. */
+static void take_smoothing(vg_model *m, const uint8_t *data, size_t size)
+{
+    vg_body b = {.mesh = m->mesh, .attributes = m->attributes, .reference = m->vertices};
+    vg_err e = {0};
+    demand(vgi_obj_take_smoothing(&b, (const char *)data, size, &e) == VG_OK);
+    m->attributes = b.attributes;
+    for (size_t i = 0; i < b.attributes.nlabels; i++) {
+        const vg_label *l = &b.attributes.labels[i];
+        demand(l->text && l->face <= m->mesh.nf && (i == 0 || l[-1].face <= l->face));
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static const char *const read_as[] = {NULL, "obj", "ply", "off"};
@@ -79,6 +92,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             there_and_back(&m, written_as[k], true);
             there_and_back(&m, written_as[k], false);
         }
+        take_smoothing(&m, data, size);
         vg_model_clear(&m);
     }
     return 0;
