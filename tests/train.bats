@@ -146,6 +146,29 @@ END
     must_fail 2 vg-generate --given 3 --between 3 "$(horse net)" "$(horse vgs)" -o no.vgs
 }
 
+# Poses of one number, the length of a sheet, which grows from 1 to 1.6 and at the end would grow on.
+@test "after 24 frames a run keeps to the range of the training data, whatever its network would do" {
+    for t in {10..69}; do
+        awk -v t=$((t - 10)) 'BEGIN {
+            for (i = 0; i < 4; i++) for (k = 0; k < 4; k++) printf "v %.9f %.9f 0\n", i * (1 + t / 59 * 0.6) / 3, k / 3
+            for (i = 0; i < 3; i++) for (k = 1; k < 4; k++) printf "f %d %d %d %d\n", 4 * i + k, 4 * i + k + 4, 4 * i + k + 5, 4 * i + k + 1
+        }' >grow.$t.obj
+    done
+    must vg-encode -q grow.*.obj -o grow.vgs
+    must vg-train $small --hold 0 grow.vgs -o grow.net
+    for first in 50 69; do
+        must vg-generate -q --frames 80 grow.net grow.$first.obj -o run.vgs
+        py <<'END'
+from read_stream import read_stream
+length = [f.values[3 * 12] - f.values[0] for f in read_stream("run.vgs").frames]
+assert len(length) == 81
+assert max(length[1:25]) > 1.62, max(length) # there is something to stop
+# the network holds its range in binary32: half a unit in the last place of 1.6 is 6e-8
+assert 1 - 6e-8 <= min(length[25:]) and max(length[25:]) <= 1.6 + 6e-8, (min(length[25:]), max(length[25:]) - 1.6)
+END
+    done
+}
+
 @test "a network of every other frame keeps the speed of the motion, and meets its keys" {
     must vg-train $small --model pca --iterations 60 --frames 6 --given 1-3 --hold 0 --step 2 "$(horse vgs)" -o step.net
     must vg-generate -q --given 6 --frames 4 step.net "$(horse vgs)" -o on.vgs
