@@ -105,7 +105,8 @@ static void list_joints(report *r, const vg_skeleton *s)
     }
 }
 
-void report_skeleton(report *r, const char *label, const vg_skeleton *s)
+/* The joints as a tree, in a group that the caller has begun. label: its name in the text. */
+static void report_skeleton(report *r, const char *label, const vg_skeleton *s)
 {
     char line[128];
     size_t bones = 0, ends = 0;

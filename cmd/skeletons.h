@@ -5,8 +5,6 @@
 
 #include "report.h"
 
-/* report_skeleton: the joints as a tree, in a group that the caller has begun. label: its name in the text. */
-void report_skeleton(report *r, const char *label, const vg_skeleton *s);
 /* report_skeletons: the skeleton and the rig of a head. turned: how many of the frames say how joints have turned. */
 void report_skeletons(report *r, const vg_head *h, uint64_t turned, uint64_t frames);
 /* write_weights: the skinning weights of a rig as text, one vertex per line. */

@@ -37,12 +37,3 @@ double vgi_random_normal(vgi_random *r)
     double radius = sqrt(-2 * log(1 - vgi_random_uniform(r)));
     return radius * cos(full_turn * vgi_random_uniform(r));
 }
-
-void vgi_random_order(vgi_random *r, size_t n, uint32_t *order)
-{
-    for (size_t i = 0; i < n; i++) {
-        size_t k = vgi_random_below(r, i + 1);
-        order[i] = order[k];
-        order[k] = (uint32_t)i;
-    }
-}

@@ -30,7 +30,5 @@ uint64_t vgi_random_bits(vgi_random *r);             /* uniform over 0 .. 2^64 -
 double vgi_random_uniform(vgi_random *r);            /* uniform in [0, 1), multiples of 2^-53 */
 size_t vgi_random_below(vgi_random *r, size_t n);    /* uniform over 0 .. n-1, n > 0 */
 double vgi_random_normal(vgi_random *r);             /* mean 0, variance 1 (Box and Muller); takes two numbers */
-/* vgi_random_order: order (n) := a permutation of 0 .. n-1, all equally likely. */
-void vgi_random_order(vgi_random *r, size_t n, uint32_t *order);
 
 #endif

@@ -47,11 +47,6 @@ static inline uint64_t take64(cursor *c)
     return p ? vgi_get64(p) : 0;
 }
 
-static inline double take_double(cursor *c)
-{
-    return vgi_as_double(take64(c));
-}
-
 /* n elements of `size` bytes, if they are present */
 static inline const unsigned char *take_array(cursor *c, uint64_t n, size_t size)
 {
@@ -85,13 +80,6 @@ static inline void copy_doubles(double *to, const unsigned char *from, size_t n)
 static inline void copy_floats(double *to, const unsigned char *from, size_t n)
 {
     for (size_t i = 0; i < n; i++) to[i] = (double)vgi_as_float(vgi_get32(from + 4 * i));
-}
-
-static inline int put32(vg_bytes *b, uint32_t x, vg_err *e)
-{
-    unsigned char p[4];
-    vgi_put32(p, x);
-    return vgi_bytes_append(b, p, sizeof p, e);
 }
 
 static inline int put64(vg_bytes *b, uint64_t x, vg_err *e)

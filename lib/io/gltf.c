@@ -416,7 +416,8 @@ int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size
     return r;
 }
 
-const unsigned char *vgi_accessor_at(const vgi_accessor *a, size_t i)
+/* Bytes of element i; NULL: zeros. */
+static const unsigned char *element_at(const vgi_accessor *a, size_t i)
 {
     size_t low = 0, high = a->nsparse;
     while (low < high) {
@@ -442,7 +443,7 @@ static double normal_of(double x, int component)
 
 void vgi_accessor_get(const vgi_accessor *a, size_t i, double *to)
 {
-    const unsigned char *p = vgi_accessor_at(a, i);
+    const unsigned char *p = element_at(a, i);
     size_t bytes = vgi_gltf_component_bytes(a->component);
     for (size_t k = 0; k < a->width; k++) {
         double x = p ? number_at(p + k * bytes, a->component) : 0;

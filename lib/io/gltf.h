@@ -78,7 +78,6 @@ int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size
 /* vgi_gltf_any_accessor: of any width and count that is valid. */
 int vgi_gltf_any_accessor(const vgi_gltf *g, const vgi_json *ref, vgi_accessor *a, vg_err *e) VG_MUST_CHECK;
 size_t vgi_accessor_bytes(const vgi_accessor *a); /* per element */
-const unsigned char *vgi_accessor_at(const vgi_accessor *a, size_t i); /* bytes of element i; NULL if zeros */
 /* vgi_gltf_view_bytes: all bytes of the buffer view with number `ref`. */
 int vgi_gltf_view_bytes(const vgi_gltf *g, const vgi_json *ref, const unsigned char **data, size_t *n,
                         vg_err *e) VG_MUST_CHECK;

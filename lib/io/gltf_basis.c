@@ -210,7 +210,7 @@ static int make_all(making *k, size_t most, vg_err *e)
     k->met = vgi_array_raw(k->width, BLOCK * sizeof *k->met, e);
     if (!k->gram || !k->values || !k->vectors || !k->frame || !k->block || !k->met) return VG_ENOMEM;
     int r = add_gram(k, e);
-    if (r == VG_OK) r = vgi_eigen(k->rows, k->gram, VGI_LARGEST, k->rows, k->values, k->vectors, e);
+    if (r == VG_OK) r = vgi_eigen(k->rows, k->gram, k->rows, k->values, k->vectors, e);
     if (r < 0) return r;
     count_directions(k, most);
     r = make_directions(k, e);

@@ -61,7 +61,7 @@ static void grow_tree(const vgi_rings *g, uint32_t centre, double *w, size_t str
 int vgi_branch_first(const vgi_rings *g, double *w, size_t stride, vg_err *e)
 {
     double *key = vgi_array_raw(g->nv, sizeof *key, e);
-    uint32_t *heap = vgi_array_raw(vgi_rings_heap(g), sizeof *heap, e), *parent = vgi_array_raw(g->nv, sizeof *parent, e);
+    uint32_t *heap = vgi_array_raw(g->nv, 2 * sizeof *heap, e), *parent = vgi_array_raw(g->nv, sizeof *parent, e);
     int r = key && heap && parent ? VG_OK : VG_ENOMEM;
     if (r == VG_OK) {
         vgi_heap h = {0, heap, heap + g->nv, key};

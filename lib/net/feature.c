@@ -21,7 +21,7 @@ struct vg_featurer {
     uint64_t jumps, poses;
 };
 
-int vgi_feature_block_make(vgi_feature_block *b, const vgi_rings *r, vg_err *e)
+static int make_block(vgi_feature_block *b, const vgi_rings *r, vg_err *e)
 {
     *b = (vgi_feature_block){0};
     size_t rows = 3 * r->nv + r->nparts, all = rows * sizeof(vgi_row) + 18 * r->nv * sizeof(vgi_lanes);
@@ -35,7 +35,7 @@ int vgi_feature_block_make(vgi_feature_block *b, const vgi_rings *r, vg_err *e)
     return VG_OK;
 }
 
-void vgi_feature_block_clear(vgi_feature_block *b)
+static void clear_block(vgi_feature_block *b)
 {
     free(b->point);
     *b = (vgi_feature_block){0};
@@ -56,7 +56,7 @@ int vg_featurer_new(vg_featurer **out, const vg_mesh *m, const double *reference
                           !(f->spill = vgi_array(n, sizeof *f->spill, e))))
         r = VG_ENOMEM;
     for (size_t i = 0; r == VG_OK && i < n; i++) {
-        r = vgi_feature_block_make(&f->blocks[i], &f->rings, e);
+        r = make_block(&f->blocks[i], &f->rings, e);
         if (r == VG_OK && !(f->spill[i] = vgi_array(spill, sizeof **f->spill, e))) r = VG_ENOMEM;
     }
     if (r < 0) vg_featurer_free(out);
@@ -68,7 +68,7 @@ void vg_featurer_free(vg_featurer **out)
     vg_featurer *f = *out;
     if (!f) return;
     for (size_t i = 0; i < (size_t)f->threads; i++) {
-        if (f->blocks) vgi_feature_block_clear(&f->blocks[i]);
+        if (f->blocks) clear_block(&f->blocks[i]);
         if (f->spill) free(f->spill[i]);
     }
     free(f->blocks);
@@ -92,11 +92,6 @@ vg_feature_stats vg_featurer_get_stats(const vg_featurer *f)
 void vg_featurer_restart(vg_featurer *f)
 {
     f->begun = false;
-}
-
-size_t vg_featurer_batch(const vg_featurer *f)
-{
-    return VGI_LANES * (size_t)f->threads;
 }
 
 typedef struct job {

@@ -20,9 +20,6 @@ typedef struct vgi_feature_block {
     double root[VGI_LANES][9]; /* rotation of the root */
 } vgi_feature_block;
 
-int vgi_feature_block_make(vgi_feature_block *b, const vgi_rings *r, vg_err *e) VG_MUST_CHECK;
-void vgi_feature_block_clear(vgi_feature_block *b);
-
 typedef struct vgi_feature_kernel {
     void (*measure)(const vgi_rings *r, vgi_feature_block *b, const double *const *poses);
     void (*put)(const vgi_rings *r, vgi_feature_block *b, size_t width, const double *const *poses,

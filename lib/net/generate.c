@@ -61,13 +61,6 @@ void vg_generator_free(vg_generator **out)
     *out = NULL;
 }
 
-void vg_generator_restart(vg_generator *g)
-{
-    g->given = g->made = g->npast = g->part = 0;
-    g->begun = g->sparse = false;
-    vg_featurer_restart(g->featurer);
-}
-
 /* ---- given poses ---- */
 
 /* The change of the frame that g->x and g->c replace. */

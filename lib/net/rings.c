@@ -136,12 +136,8 @@ static int find_parts(vgi_rings *x, const vg_mesh *m, vg_err *e)
     return r;
 }
 
-size_t vgi_rings_heap(const vgi_rings *x)
-{
-    return 2 * x->nv;
-}
-
-void vgi_rings_from(const vgi_rings *x, uint32_t v, double *distance, uint32_t *heap)
+/* Distances along edges from vertex v to all vertices of its component (others: INFINITY). heap: 2 nv numbers of workspace. */
+static void find_distances(const vgi_rings *x, uint32_t v, double *distance, uint32_t *heap)
 {
     vgi_heap h = {0, heap, heap + x->nv, distance};
     for (size_t i = 0; i < x->nv; i++) distance[i] = INFINITY, h.place[i] = UINT32_MAX;
@@ -166,7 +162,7 @@ static uint32_t find_centre(const vgi_rings *x, size_t part, double *most, doubl
     while (x->part[v] != (int)part) v++;
     for (size_t i = 0; i < x->nv; i++) most[i] = 0, near[i] = INFINITY;
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        vgi_rings_from(x, v, from, heap);
+        find_distances(x, v, from, heap);
         for (size_t i = 0; i < x->nv; i++) {
             if (x->part[i] != (int)part) continue;
             most[i] = fmax(most[i], from[i]);
@@ -200,13 +196,13 @@ static int find_ball(vgi_rings *x, const double *from, double *sorted, vg_err *e
 static int find_centres(vgi_rings *x, vg_err *e)
 {
     double *work = vgi_array_raw(3 * x->nv, sizeof *work, e);
-    uint32_t *heap = vgi_array_raw(vgi_rings_heap(x), sizeof *heap, e);
+    uint32_t *heap = vgi_array_raw(x->nv, 2 * sizeof *heap, e);
     x->centre = vgi_array_raw(x->nparts, sizeof *x->centre, e);
     int r = work && heap && x->centre ? VG_OK : VG_ENOMEM;
     for (size_t p = 0; r == VG_OK && p < x->nparts; p++)
         x->centre[p] = find_centre(x, p, work, work + x->nv, work + 2 * x->nv, heap);
     if (r == VG_OK) {
-        vgi_rings_from(x, x->centre[x->main_part], work, heap);
+        find_distances(x, x->centre[x->main_part], work, heap);
         r = find_ball(x, work, work + x->nv, e);
     }
     free(work);

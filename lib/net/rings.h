@@ -38,9 +38,4 @@ typedef struct vgi_rings {
 int vgi_rings_make(vgi_rings *r, const vg_mesh *m, const double *reference, vg_err *e) VG_MUST_CHECK;
 void vgi_rings_clear(vgi_rings *r);
 
-/* vgi_rings_from: distances along edges from vertex v to all vertices of its component (others: INFINITY). heap:
- * workspace of vgi_rings_heap(r) numbers. */
-void vgi_rings_from(const vgi_rings *r, uint32_t v, double *distance, uint32_t *heap);
-size_t vgi_rings_heap(const vgi_rings *r);
-
 #endif

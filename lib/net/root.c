@@ -17,7 +17,8 @@ static void unturn(const double q[4], const double x[3], double y[3])
     vg_quat_apply(back, x, y);
 }
 
-void vgi_root_steps(const vg_network *n, size_t main_part, const double root[4], const double *centroids,
+/* The numbers of vgi_root_predict, measured. */
+static void measure_step(const vg_network *n, size_t main_part, const double root[4], const double *centroids,
                     const double next_root[4], const double *next_centroids, double *steps)
 {
     double back[4] = {root[0], -root[1], -root[2], -root[3]}, q[4], l[4], shift[3];
@@ -88,7 +89,7 @@ int vgi_root_fit(const vgi_dataset *s, vg_network *n, vg_err *e)
     for (size_t i = 0; i < s->train.n; i++)
         for (size_t t = s->train.at[i].first; t + 1 < s->train.at[i].end; t++, row++) {
             regressors(n, s->coordinates + (t + 1) * k, s->coordinates + t * k, z + row * rows);
-            vgi_root_steps(n, s->main_part, s->roots + 4 * t, s->centroids + 3 * s->parts * t, s->roots + 4 * (t + 1),
+            measure_step(n, s->main_part, s->roots + 4 * t, s->centroids + 3 * s->parts * t, s->roots + 4 * (t + 1),
                            s->centroids + 3 * s->parts * (t + 1), y + row * w);
         }
     memset(a, 0, rows * rows * sizeof *a);

@@ -9,11 +9,8 @@
 /* vgi_root_fit: n->root: ridge regression of the steps of all training frames on their coordinates and the change of
  * those. */
 int vgi_root_fit(const vgi_dataset *s, vg_network *n, vg_err *e) VG_MUST_CHECK;
-/* vgi_root_steps: numbers of the step between two frames: turn (3), shift in the root's frame (3, in D), and the
- * position of each other component relative to the largest at the end of the step (3 each, in D). */
-void vgi_root_steps(const vg_network *n, size_t main_part, const double root[4], const double *centroids,
-                    const double next_root[4], const double *next_centroids, double *steps);
-/* vgi_root_predict: the same numbers, from coordinates c and those before. */
+/* vgi_root_predict: numbers of the step between two frames, from coordinates c and those before: turn (3), shift in the root's
+ * frame (3, in D), and the position of each other component relative to the largest at the end of the step (3 each, in D). */
 void vgi_root_predict(const vg_network *n, const double *c, const double *before, double *steps);
 /* vgi_root_move: advance root and centroids by the steps. */
 void vgi_root_move(const vg_network *n, size_t main_part, const double *steps, double root[4], double *centroids);

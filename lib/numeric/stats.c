@@ -24,13 +24,6 @@ double vgi_mean(const double *x, size_t n)
     return n ? sum / (double)n : 0;
 }
 
-double vgi_variance(const double *x, size_t n)
-{
-    double mean = vgi_mean(x, n), sum = 0;
-    for (size_t i = 0; i < n; i++) sum += (x[i] - mean) * (x[i] - mean);
-    return n ? sum / (double)n : 0;
-}
-
 /* Hoare's selection: only the part that contains the rank is processed further. */
 double vgi_select(double *x, size_t n, size_t rank)
 {
@@ -61,15 +54,6 @@ double vgi_percentile(double *x, size_t n, double p)
     if (!n) return 0;
     double rank = ceil(p * (double)n / 100) - 1;
     return vgi_select(x, n, !(rank > 0) ? 0 : rank < (double)(n - 1) ? (size_t)rank : n - 1);
-}
-
-void vgi_running_add(vgi_running *r, double x)
-{
-    double d = x - r->mean;
-    r->n++;
-    r->mean += d / r->n;
-    r->squares += d * (x - r->mean);
-    if (x > r->max) r->max = x;
 }
 
 void vgi_running_merge(vgi_running *r, const vgi_running *more)

@@ -11,7 +11,6 @@ int vgi_by_number(const void *a, const void *b);
 int vgi_by_index(const void *a, const void *b);
 
 double vgi_mean(const double *x, size_t n);               /* 0 if n is 0 */
-double vgi_variance(const double *x, size_t n);           /* sum (x - mean)^2 / n, in two passes; 0 if n is 0 */
 /* vgi_select: the element with that rank in ascending order, rank < n. Reorders x: x[rank] is the result, elements
  * before it are not larger, those after it not smaller. O(n) on average. No NaN. */
 double vgi_select(double *x, size_t n, size_t rank);
@@ -21,12 +20,12 @@ double vgi_median(double *x, size_t n);
  * - 1; 0 if n is 0. Reorders x. */
 double vgi_percentile(double *x, size_t n, double p);
 
-/* Running mean and variance without cancellation (Welford 1962). Initialise with {0}. */
+/* Mean and variance of numbers in parts that are merged, without cancellation (Chan et al. 1979). {0}: of no numbers; of one
+ * number x: {1, x, 0, x}. */
 typedef struct vgi_running {
-    double n, mean, squares, max; /* squares: sum (x - mean)^2; max: initially 0 */
+    double n, mean, squares, max; /* squares: sum (x - mean)^2; max: at least 0 */
 } vgi_running;
-void vgi_running_add(vgi_running *r, double x);
-/* vgi_running_merge: as if the numbers added to `more` had been added to *r after its own (Chan et al. 1979). */
+/* vgi_running_merge: *r becomes that of its numbers and those of `more`. */
 void vgi_running_merge(vgi_running *r, const vgi_running *more);
 double vgi_running_deviation(const vgi_running *r); /* sqrt(squares / n); 0 if n is 0 */
 

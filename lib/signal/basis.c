@@ -89,7 +89,7 @@ static int find_weights(vgi_basis *b, const double *g, double *weight, vg_err *e
 {
     size_t n = b->n;
     double *copy = vgi_copy_array(g, n * n, sizeof *g, e);
-    int r = copy ? vgi_eigen(n, copy, VGI_LARGEST, n, b->value, weight, e) : VG_ENOMEM;
+    int r = copy ? vgi_eigen(n, copy, n, b->value, weight, e) : VG_ENOMEM;
     free(copy);
     if (r < 0) return r;
     while (b->rank + 1 < n && b->value[b->rank] > 1e-14 * b->value[0]) b->rank++;

@@ -104,7 +104,7 @@ static int principal(size_t n, size_t m, const double *x, size_t nmore, const do
         for (size_t i = 0; i < n; i++)
             for (size_t k = 0; k < w; k++) all[i * w + k] = k < few ? x[i * m + k] : more[MORE * i + k - few];
         vgi_product_transposed_double(w, w, n, all, w, all, w, c, w);
-        if ((r = vgi_eigen(w, c, VGI_LARGEST, count, value, vector, e)) == VG_OK)
+        if ((r = vgi_eigen(w, c, count, value, vector, e)) == VG_OK)
             vgi_product_double_transposed(n, count, w, all, w, vector, w, axes, 3);
     }
     free(all);
@@ -165,8 +165,10 @@ static int settle_pinned(size_t n, const double *distance, const vg_pin *pins, s
     return r;
 }
 
-int vgi_layout_make(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const double *square,
-                    const vg_pin *pins, size_t npins, double *p, vg_err *e)
+/* Positions p with rms radius 1; with pins about 1, and the pins are met exactly. x: n x m principal coordinates. square: their
+ * squared distances. period: for VG_LAYOUT_RING. */
+static int make_layout(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const double *square,
+                       const vg_pin *pins, size_t npins, double *p, vg_err *e)
 {
     int r = VG_ENOMEM;
     double *distance = vgi_array_raw(n * n, sizeof *distance, e), *more = vgi_array(n, MORE * sizeof *more, e);
@@ -301,7 +303,7 @@ static void try_one(void *context, size_t index)
     choice *c = context;
     size_t i = c->first + index;
     double *p = c->p + 2 * c->n * i;
-    c->status[i] = vgi_layout_make(&c->tried[i], c->period, c->n, c->m, c->x, c->square, c->pins, c->npins, p,
+    c->status[i] = make_layout(&c->tried[i], c->period, c->n, c->m, c->x, c->square, c->pins, c->npins, p,
                                   NULL);
     if (c->status[i] == VG_OK)
         c->status[i] = vgi_layout_judge(c->n, c->m, c->x, p, &c->tried[i].ratio, NULL, NULL);

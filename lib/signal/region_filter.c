@@ -161,7 +161,7 @@ static int learn_region(vg_region_filter *x, size_t i, double *values, double *v
         keep_all(n, filter);
         return VG_OK;
     }
-    int r = vgi_eigen(n, filter, VGI_LARGEST, n, values, vectors, e);
+    int r = vgi_eigen(n, filter, n, values, vectors, e);
     if (r < 0) return r;
     double variance = find_noise(rows, n, values);
     x->noise[i] = sqrt(variance);

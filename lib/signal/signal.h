@@ -65,10 +65,6 @@ double vgi_plane_radius(size_t n, const double *p, double centre[2]);
 
 /* vgi_period: the length of a cycle in frames, 0 if there is none. square: from vgi_distances. */
 int vgi_period(size_t n, const double *square, double *period, vg_err *e) VG_MUST_CHECK;
-/* vgi_layout_make: positions p with rms radius 1; with pins about 1, and the pins are met exactly. x: n x m principal
- * coordinates. square: their squared distances. period: for VG_LAYOUT_RING. */
-int vgi_layout_make(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const double *square,
-                    const vg_pin *pins, size_t npins, double *p, vg_err *e) VG_MUST_CHECK;
 /* vgi_layout_judge: rms distance between the full-precision signals at these positions and a cubic spline through the
  * x, at a quarter, a half and three quarters between frames, relative to that of straight lines. deviation (3 (n - 1)
  * squares, may be NULL): relative to the mean square of straight lines. */
@@ -149,7 +145,6 @@ double vgi_monotone_at(size_t n, const double *x, const double *y, const double 
 int vgi_curve_fit(vgi_curve *c, size_t n, const double *p, const double *t, const uint32_t *at, size_t count,
                   vg_err *e) VG_MUST_CHECK;
 void vgi_curve_clear(vgi_curve *c);
-int vgi_curve_copy(vgi_curve *to, const vgi_curve *from, vg_err *e) VG_MUST_CHECK;
 double vgi_curve_parameter(const vgi_curve *c, double time);
 void vgi_curve_point(const vgi_curve *c, double parameter, double p[2]);
 void vgi_curve_at(const vgi_curve *c, double time, double p[2]);

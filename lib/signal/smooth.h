@@ -39,7 +39,7 @@ typedef struct vgi_window {
     double *ring;         /* places x numbers */
     size_t known, given;  /* frames added; results returned */
     bool ended;           /* no more frames will be added */
-    /* set by vgi_window_look: n frames in order, their weights in a linear filter, and which of them is filtered */
+    /* set by vgi_window_filter: n frames in order, their weights in a linear filter, and which of them is filtered */
     size_t n, at;
     double *weight;
     const double **frame;
@@ -51,8 +51,6 @@ void vgi_window_clear(vgi_window *w);
 double *vgi_window_place(const vgi_window *w, size_t i); /* of frame i */
 /* vgi_window_ready: can frame number `given` be filtered? */
 bool vgi_window_ready(const vgi_window *w);
-/* vgi_window_look: set n, at, frame, and weight unless t is the robust filter, for frame number `given`. */
-void vgi_window_look(vgi_window *w, const vgi_time_filter *t);
 /* vgi_window_robust: is t the robust filter, and on? */
 bool vgi_window_robust(const vgi_time_filter *t);
 /* vgi_window_filter: filter the numbers from `first` on; points of `width` <= 4 numbers move together in the robust

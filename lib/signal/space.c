@@ -95,7 +95,8 @@ static double twice(size_t k) /* weight of an element of a symmetric matrix: off
     return k == 0 || k == 3 || k == 5 ? 1 : M_SQRT2;
 }
 
-void vgi_stretch_put(const double m[9], double weight, double out[6])
+/* The inverse of vgi_stretch_get. */
+static void put_stretch(const double m[9], double weight, double out[6])
 {
     for (size_t k = 0; k < 6; k++) {
         size_t at = upper[k], across = 3 * (at % 3) + at / 3;
@@ -203,7 +204,7 @@ static void measure_pose(void *context, size_t index)
         const double *corner = corners + 4 * (size_t)s->g->faces.start[s->pieces.face[i]];
         if (s->kind == VG_SPACE_LENGTHS) measure_frame(s, i, pose, corner, turns + 4 * i);
         else measure_gradient(s, i, pose, corner, turns + 4 * i, stretch);
-        if (has_gradients(s)) vgi_stretch_put(stretch, sqrt(s->pieces.share[i]), values + vgi_space_stretch_at(s, i));
+        if (has_gradients(s)) put_stretch(stretch, sqrt(s->pieces.share[i]), values + vgi_space_stretch_at(s, i));
     }
     if (s->kind == VG_SPACE_LENGTHS) vgi_relative_lengths(s, pose, values);
 }

@@ -55,9 +55,8 @@ void vgi_relative_finish(const vgi_space *s, size_t n, const double *turns, doub
 /* vgi_relative_edges: the edges of the pieces of a shape, written to s->moved. */
 int vgi_relative_edges(vgi_space *s, const double *values, vg_err *e) VG_MUST_CHECK;
 
-/* Stretches as six numbers of a symmetric matrix minus the identity, weighted so that their sum of squares is that of
- * the matrix. */
-void vgi_stretch_put(const double m[9], double weight, double out[6]);
+/* vgi_stretch_get: the stretch m from six numbers of a symmetric matrix minus the identity, weighted so that their sum of squares
+ * is that of the matrix. */
 void vgi_stretch_get(const double in[6], double weight, double m[9]);
 
 #endif

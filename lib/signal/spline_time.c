@@ -98,19 +98,6 @@ void vgi_curve_clear(vgi_curve *c)
     *c = (vgi_curve){0};
 }
 
-int vgi_curve_copy(vgi_curve *to, const vgi_curve *from, vg_err *e)
-{
-    *to = (vgi_curve){.n = from->n, .k = from->k};
-    if (!(to->t = vgi_copy_array(from->t, from->n, sizeof *to->t, e)) ||
-        !(to->slope = vgi_copy_array(from->slope, from->n, sizeof *to->slope, e)) ||
-        !(to->knot = vgi_copy_array(from->knot, from->k + 4, sizeof *to->knot, e)) ||
-        !(to->control = vgi_copy_array(from->control, from->k, 2 * sizeof *to->control, e))) {
-        vgi_curve_clear(to);
-        return VG_ENOMEM;
-    }
-    return VG_OK;
-}
-
 /* The four functions that are nonzero at u; the first has number s - 3, which is returned. */
 static size_t basis_at(const double *knot, size_t k, double u, double b[4])
 {

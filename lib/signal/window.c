@@ -51,7 +51,8 @@ bool vgi_window_robust(const vgi_time_filter *t)
     return t->filter == VG_ROBUST && t->span > 0;
 }
 
-void vgi_window_look(vgi_window *w, const vgi_time_filter *t)
+/* Set n, at, frame, and weight unless t is the robust filter, for frame number `given`. */
+static void look(vgi_window *w, const vgi_time_filter *t)
 {
     size_t lo;
     vgi_time_window(t, w->given, w->known, w->ended, &lo, &w->n);
@@ -91,7 +92,7 @@ void vgi_window_filter(vgi_window *w, const vgi_time_filter *t, int threads, siz
                        double *out)
 {
     filtering f = {.w = w, .t = t, .first = first, .width = width, .numbers = numbers, .out = out};
-    vgi_window_look(w, t);
+    look(w, t);
     vgi_parallel(threads, (numbers + CHUNK - 1) / CHUNK, filter_chunk, &f);
 }
 

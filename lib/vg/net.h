@@ -38,14 +38,12 @@ vg_feature_stats vg_featurer_get_stats(const vg_featurer *f);
 /* vg_featurer_restart: the next pose begins another sequence: its whole turns are chosen afresh. */
 void vg_featurer_restart(vg_featurer *f);
 /* vg_featurer_measure: n poses (nv points each), in order, to width numbers per vertex, a unit quaternion for the root
- * and a point per component each. On failure nothing is defined. */
+ * and a point per component each. Eight poses per thread at a time are fastest. On failure nothing is defined. */
 int vg_featurer_measure(vg_featurer *f, size_t n, const double *const *poses, double *const *values,
                         double *const *roots, double *const *centroids, vg_err *e) VG_MUST_CHECK;
 /* vg_featurer_solve: the way back. A root NULL: not turned. */
 void vg_featurer_solve(vg_featurer *f, size_t n, const double *const *values, const double *const *roots,
                        const double *const *centroids, double *const *vertices);
-/* vg_featurer_batch: how many poses make the threads work best at a time. */
-size_t vg_featurer_batch(const vg_featurer *f);
 
 #define VG_HOLD_BY_SEED (SIZE_MAX - 1)
 typedef struct vg_train_options {
@@ -132,9 +130,8 @@ typedef struct vg_way {
 int vg_generator_new(vg_generator **g, const vg_network *n, const vg_mesh *m, const double *reference,
                      const vg_generate_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_generator_free(vg_generator **g);
-/* vg_generator_give: the next given pose (nv points). vg_generator_restart: the next one begins another run. */
+/* vg_generator_give: the next given pose (nv points). */
 int vg_generator_give(vg_generator *g, const double *pose, vg_err *e) VG_MUST_CHECK;
-void vg_generator_restart(vg_generator *g);
 /* vg_generator_next: the next pose (nv points out), from what was given and what came of it. */
 int vg_generator_next(vg_generator *g, double *pose, vg_err *e) VG_MUST_CHECK;
 /* vg_generator_between: n poses that lead from the last given pose to `key`, which then is the last given one: the

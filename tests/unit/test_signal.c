@@ -418,7 +418,8 @@ static void control_is_local(void)
     vgi_curve c, moved, more;
     spiral(p);
     vgi_parameters(N, p, t);
-    if (vgi_curve_fit(&c, N, p, t, at, 10, NULL) < 0 || vgi_curve_copy(&moved, &c, NULL) < 0 || vgi_curve_copy(&more, &c, NULL) < 0)
+    if (vgi_curve_fit(&c, N, p, t, at, 10, NULL) < 0 || vgi_curve_fit(&moved, N, p, t, at, 10, NULL) < 0 ||
+        vgi_curve_fit(&more, N, p, t, at, 10, NULL) < 0)
         abort();
     moved.control[2 * 5] += 0.25;
     if (vgi_curve_insert(&more, t[20] + 0.1, NULL) < 0 || vgi_curve_insert(&more, t[2], NULL) < 0) abort();

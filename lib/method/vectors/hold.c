@@ -55,7 +55,8 @@ static int make_border(const vg_solver *s, vgi_border *border, vg_err *e)
     return VG_OK;
 }
 
-int vgi_solver_share(vg_solver *s, vg_err *e)
+/* Make the data shared with derived solvers, unless it exists. */
+static int share(vg_solver *s, vg_err *e)
 {
     if (s->sharing) return VG_OK;
     vgi_sharing *x = s->sharing = vgi_array(1, sizeof *x, e);
@@ -171,7 +172,7 @@ int vg_solver_new_like(vg_solver **s, size_t n, vg_solver *like, const uint32_t 
 {
     for (size_t i = 0; i < n; i++) s[i] = NULL;
     if (like->like) return vg_fail(e, VG_EARG, "a derived solver cannot be the base of another one");
-    int r = vgi_solver_share(like, e);
+    int r = share(like, e);
     if (r < 0) return r;
     vg_err *errors = vgi_array(n, sizeof *errors, e);
     if (!errors) return VG_ENOMEM;

@@ -51,8 +51,6 @@ static inline size_t vgi_solver_all_rows(const vg_solver *s)
 }
 
 void *vgi_solver_for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e);
-/* vgi_solver_share: make the data shared with derived solvers, unless it exists. */
-int vgi_solver_share(vg_solver *s, vg_err *e) VG_MUST_CHECK;
 void vgi_sharing_free(vgi_sharing **x);
 /* vgi_solver_solve_like: vg_solver_solve for n poses of a derived solver s; s NULL: pose i uses each[i]. */
 void vgi_solver_solve_like(size_t n, const vg_solver *s, vg_solver *const *each, const double *const *rhs,
