@@ -357,6 +357,8 @@ void cli_need_vertices(const vg_head *h, const char *subject)
              known ? advice[h->kind] : "vertices are needed here");
 }
 
+enum { MOST_TEXT = 256 << 20 };
+
 char *cli_read_file(const char *path, size_t *n)
 {
     char *data = NULL;
@@ -370,6 +372,7 @@ char *cli_read_file(const char *path, size_t *n)
         size_t got = fread(data + *n, 1, cap - *n, f);
         *n += got;
         if (got == 0) break;
+        if (*n > MOST_TEXT) cli_stop(VG_EINPUT, "'%s' holds more than %d MiB, too much for a text of this kind", path, MOST_TEXT >> 20);
     }
     if (!f || ferror(f)) cli_stop(VG_ESYS, "cannot read '%s': %s", path, strerror(errno ? errno : EIO));
     if (f != stdin) fclose(f);

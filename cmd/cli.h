@@ -129,6 +129,8 @@ void cli_progress_detail(const char *format, ...) VG_PRINTF(1, 2);
  * far it is. doing is borrowed for the rest of the run. */
 void cli_working(const char *doing);
 
+/* cli_scan_number: the finite decimal number that the text begins with; returns what follows it, or NULL. */
+const char *cli_scan_number(const char *text, double *x);
 /* cli_parse_number: parse the whole text as a finite number; else cli_usage with the name of the option. */
 double cli_parse_number(const char *option, const char *text);
 /* cli_parse_numbers: parse "1,2.5,-3" to at most `most` numbers. Returns the number of them, 0 if the text is
@@ -154,7 +156,8 @@ void cli_load(vg_head *h, const char *operand, const char *what);
  * Messages call the sequence `subject` ("the input", "'a.vgs'"). */
 void cli_need_vertices(const vg_head *h, const char *subject);
 
-/* cli_read_file: a whole file ("-": standard input), terminated by 0; caller frees it. Stops if it cannot be read. */
+/* cli_read_file: a whole file ("-": standard input), terminated by 0; caller frees it. Stops if it cannot be read, or
+ * holds more than 256 MiB (it may have no end). */
 char *cli_read_file(const char *path, size_t *n);
 
 /* The output stream of a filter. cli_stream_open takes the head, adds this process to the provenance (unless

@@ -46,12 +46,12 @@ bool lines_word(lines *l, const char *word)
 size_t lines_numbers(lines *l, double *x, size_t most)
 {
     size_t n = 0;
-    for (char *end;; n++, l->now = end) {
+    for (const char *end;; n++, l->now += end - l->now) {
         l->now += strspn(l->now, " \t");
         if (!*l->now) return n;
         if (n == most) return 0;
-        x[n] = strtod(l->now, &end);
-        if (end == l->now || (*end && !strchr(" \t", *end)) || !(fabs(x[n]) <= 1e100)) return 0;
+        end = cli_scan_number(l->now, &x[n]);
+        if (!end || (*end && !strchr(" \t", *end)) || fabs(x[n]) > 1e100) return 0;
     }
 }
 

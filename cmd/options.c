@@ -109,12 +109,19 @@ static void print_help(const cli_program *p)
 }
 
 /* strtod also accepts leading blanks, hexadecimal numbers and names. */
-static bool parse_number(const char *text, double *x)
+const char *cli_scan_number(const char *text, double *x)
 {
     char *end;
-    if (!*text || text[strspn(text, "+-.0123456789eE")]) return false;
+    const size_t decimal = strspn(text, "+-.0123456789eE");
+    if (!decimal) return NULL;
     *x = strtod(text, &end);
-    return !*end && isfinite(*x);
+    return end > text && end <= text + decimal && isfinite(*x) ? end : NULL;
+}
+
+static bool parse_number(const char *text, double *x)
+{
+    const char *end = cli_scan_number(text, x);
+    return end && !*end;
 }
 
 static bool parse_integer(const char *text, long *x)
@@ -177,6 +184,7 @@ static void take_option(size_t number, const char *value)
     if (o->flag) {
         *o->flag = true;
     } else if (o->text) {
+        if (!*value && !strcmp(o->value, "FILE")) cli_usage("option '--%s' needs the name of a file", o->name);
         *o->text = value;
     } else if (o->number) {
         double x;

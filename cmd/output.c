@@ -135,7 +135,6 @@ void output_check(bool stream)
     if (stream && name && (names_meshes(name) || names_picture(name))) refuse_stream(name);
     if (stream && !name && isatty(STDOUT_FILENO)) refuse_terminal();
     if (!name) return;
-    if (!*name) cli_usage("option '--output' needs the name of a file");
     snprintf(out.shown, sizeof out.shown, "'%s'", name);
     if (vg_target_check(name, &e) < 0) cli_die(&e);
 }

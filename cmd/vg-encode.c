@@ -226,6 +226,27 @@ static void encode_raw(work *w, char **operands, size_t n)
     vg_head_clear(&h);
 }
 
+static void check_axes(const char *axes)
+{
+    if (axes && (strlen(axes) != 3 || !strchr(axes, 'f') || !strchr(axes, 'v') || !strchr(axes, 'x')))
+        cli_usage("option '--array-axes' needs f, v and x in the order of the axes, such as vxf, not '%s'", axes);
+}
+
+/* An option for files that none of the inputs is. */
+static void warn_of_ignored(const vg_source *s)
+{
+    static const struct {
+        const char *member, *option, *formats;
+    } all[] = {{"array_axes", "--array-axes", "NPZ"},
+               {"objects", "--objects frames", "OBJ"},
+               {"animation", "--animation", "GLB and glTF"},
+               {"shapes", "--shapes", "GLB and glTF"},
+               {"unwelded", "--weld off", "GLB and glTF"}};
+    const char *member = vg_source_ignored(s);
+    for (size_t i = 0; member && i < sizeof all / sizeof *all; i++)
+        if (!strcmp(all[i].member, member)) cli_warn("%s is for %s, and no input is one", all[i].option, all[i].formats);
+}
+
 int main(int argc, char **argv)
 {
     static const step encoding = {
@@ -236,6 +257,7 @@ int main(int argc, char **argv)
     if (opts.anchors) w.nanchors = cli_parse_vertices("--anchor", opts.anchors, &w.anchors);
     opts.reading.fps = opts.fps, opts.reading.unwelded = opts.weld == 1, opts.reading.objects = opts.objects == 1;
     if (opts.reading.shapes && opts.reading.animation) cli_usage("--shapes and --animation exclude one another");
+    check_axes(opts.reading.array_axes);
     vg_source_options from = {.mesh = opts.mesh, .reading = opts.reading};
     if (opts.most_bytes && !(from.most_bytes = cli_parse_size("max-bytes", opts.most_bytes)))
         cli_usage("option '--max-bytes' needs a size of at least 1");
@@ -244,6 +266,7 @@ int main(int argc, char **argv)
     } else {
         vg_source *s = cli_source_with(operands, n, &from);
         step_run(&encoding, &w, s);
+        warn_of_ignored(s);
         vg_source_close(&s);
     }
     vg_frame_clear(&w.vectors);

@@ -23,10 +23,8 @@ static void take_pin(const char *text, void *context)
 {
     const char *equals = strchr(text, '=');
     double number, at[2];
-    char *end;
     (void)context;
-    number = strtod(text, &end);
-    if (!equals || end != equals || !(number >= 1 && number <= VG_SIGNAL_FRAMES) || number != floor(number) ||
+    if (!equals || cli_scan_number(text, &number) != equals || !(number >= 1 && number <= VG_SIGNAL_FRAMES) || number != floor(number) ||
         cli_parse_numbers(equals + 1, at, 2) != 2)
         cli_usage("option '--pin' needs a frame and a place, '12=0.5,-1', not '%s'", text);
     opts.pins = cli_resize(opts.pins, opts.npins + 1, sizeof *opts.pins, "pins");

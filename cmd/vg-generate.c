@@ -16,10 +16,9 @@ static struct {
 static void take_merge(const char *text, void *context)
 {
     (void)context;
-    char *end;
-    opts.merge = strtod(text, &end);
-    if (*end == '%' && !end[1]) opts.merge /= 100, end++;
-    if (*end || end == text || !(opts.merge > 0 && opts.merge <= 1))
+    const char *end = cli_scan_number(text, &opts.merge);
+    if (end && *end == '%') opts.merge /= 100, end++;
+    if (!end || *end || !(opts.merge > 0 && opts.merge <= 1))
         cli_usage("option '--merge' needs a share of the training range such as 5%%, not '%s'", text);
 }
 

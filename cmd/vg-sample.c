@@ -63,10 +63,10 @@ static bool parse_range(char *text, double range[3])
 {
     int n = 0;
     for (char *part = text; part && n < 3; n++) {
-        char *colon = strchr(part, ':'), *end;
+        char *colon = strchr(part, ':');
         if (colon) *colon++ = 0;
-        range[n] = strtod(part, &end);
-        if (end == part || *end || !isfinite(range[n])) return false;
+        const char *end = cli_scan_number(part, &range[n]);
+        if (!end || *end) return false;
         part = colon;
         if (part && n == 2) return false;
     }

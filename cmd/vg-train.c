@@ -34,16 +34,17 @@ static void take_loss(const char *text, void *context)
 {
     static const char *const names[] = {"bidirectional", "kl", "l2"};
     (void)context;
-    for (const char *p = text; *p;) {
+    const char *p = text;
+    do {
         size_t which = 0, length = strcspn(p, "=");
         while (which < 3 && (strlen(names[which]) != length || strncmp(p, names[which], length))) which++;
-        char *end = NULL;
-        double weight = which < 3 && p[length] ? strtod(p + length + 1, &end) : -1;
-        if (!end || end == p + length + 1 || (*end && *end != ',') || !(weight >= 0 && weight < INFINITY))
+        double weight;
+        const char *end = which < 3 && p[length] ? cli_scan_number(p + length + 1, &weight) : NULL;
+        if (!end || (*end && *end != ',') || weight < 0)
             cli_usage("option '--loss' needs bidirectional=W, kl=W or l2=W, commas between, not '%s'", text);
         opts.losses[which] = weight;
-        p = *end ? end + 1 : end;
-    }
+        p = *end ? end + 1 : NULL;
+    } while (p);
 }
 
 static void take_hold(const char *text, void *context)

@@ -93,6 +93,16 @@ answers() {
     for size in 0 '' x 1X -1 '1 ' '1K '; do must_fail 2 vg-encode --max-bytes "$size" bomb.zip -o no.vgs; done
 }
 
+@test "a text that has no end is refused" {
+    printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >a.obj
+    must_fail 3 soon vg-register --markers /dev/zero a.obj a.obj -o no.vgs
+    says "'/dev/zero' holds more than 256 MiB, too much for a text of this kind"
+    one_line
+    pipe_fail 3 "yes '# nothing' 2>/dev/null | vg-sample --edit - '$GOLDEN/signal.vgs' -o no.vgs"
+    says "'-' holds more than 256 MiB"
+    [ ! -e no.vgs ]
+}
+
 @test "a pipe gives no more than --max-bytes to any reader, however short; arrays that are stored may be longer" {
     printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >a.obj
     pipe_fail 3 "cat a.obj | vg-encode --max-bytes 20 -o no.vgs"

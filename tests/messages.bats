@@ -66,8 +66,35 @@ mistake() {
     mistake 2 'vg-deform --by shape walk.vgs' "--by needs --onto"
     mistake 2 'vg-segment -k many walk.vgs' "a whole number from 1 on or 'auto', not 'many'"
     mistake 2 'vg-diff walk.vgs' "two sequences are needed"
+    mistake 2 'vg-encode -o "" walk.vgs' "option '--output' needs the name of a file"
+    mistake 2 'vg-train --checkpoint "" walk.vgs' "option '--checkpoint' needs the name of a file"
+    mistake 2 'vg-train --loss "" walk.vgs' "needs bidirectional=W, kl=W or l2=W"
+    mistake 2 'vg-train --loss kl=0x1 walk.vgs' "commas between, not 'kl=0x1'"
+    mistake 2 'vg-generate --merge " 5%" --between 3 walk.vgs walk.vgs' "a share of the training range such as 5%, not ' 5%'"
+    mistake 2 "vg-sample --at 0x10 '$GOLDEN/signal.vgs'" "times and ranges A:B:STEP"
+    mistake 2 'vg-encode --array-axes vvx walk.vgs' "needs f, v and x in the order of the axes, such as vxf, not 'vvx'"
     mistake 3 'vg-poisson --key 99=pose1.obj walk.vgs' "whose numbers are 0 to 1"
     [ ! -e out.zip ] && [ ! -e out.obj ] && [ ! -e out ]
+}
+
+# ignored OPTION... FORMATS: an option for files of these formats is said to have no effect on a stream
+ignored() {
+    must_warn vg-encode "${@:1:$#-1}" walk.vgs -o out.vgs
+    [ "$stderr" = "vg-encode: warning: ${*:1:$#-1} is for ${!#}, and no input is one" ] || fail "$stderr"
+}
+
+@test "an option that no input has a use for is named" {
+    poses cube 2
+    must vg-encode pose1.obj pose2.obj -o walk.vgs
+    ignored --objects frames OBJ
+    ignored --shapes "GLB and glTF"
+    ignored --weld off "GLB and glTF"
+    for option in array-axes animation; do must_warn vg-encode --$option xvf walk.vgs -o out.vgs; done
+    says "warning: --animation is for GLB and glTF, and no input is one"
+    # where there is one, nothing is said, whatever else is read
+    must vg-decode walk.vgs -o walk.glb
+    must vg-encode --weld off pose1.obj walk.glb -o out.vgs
+    must vg-encode --animation sequence walk.glb -o out.vgs
 }
 
 @test "in a pipe every program names the one that failed first, and its reason, once" {

@@ -493,14 +493,14 @@ enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEP
 enum { KINDS = 1 << VG_VERTICES | 1 << VG_TRANSFORMS }; /* transforms: of a rig */
 
 const vgi_sequence_format vgi_sequence_glb = {
-    .name = "glb", .suffix = ".glb", .keeps = KEEPS, .bare = true, .sniff = sniff_glb,
+    .name = "glb", .suffix = ".glb", .keeps = KEEPS, .uses = VGI_USES_GLTF, .bare = true, .sniff = sniff_glb,
     .open = vgi_gltf_play, .next = vgi_gltf_next, .frames = vgi_gltf_frames, .note = vgi_gltf_note,
     .close = vgi_gltf_close,
     .kinds = KINDS, .check = vgi_gltf_check, .begin = begin_glb, .put = vgi_gltf_put, .end = vgi_gltf_end,
     .warning = vgi_gltf_warning, .report = vgi_gltf_report, .release = vgi_gltf_release};
 
 const vgi_sequence_format vgi_sequence_gltf = {
-    .name = "gltf", .suffix = ".gltf", .keeps = KEEPS, .bare = true, .sniff = sniff_gltf,
+    .name = "gltf", .suffix = ".gltf", .keeps = KEEPS, .uses = VGI_USES_GLTF, .bare = true, .sniff = sniff_gltf,
     .open = vgi_gltf_play, .next = vgi_gltf_next, .frames = vgi_gltf_frames, .note = vgi_gltf_note,
     .close = vgi_gltf_close,
     .kinds = KINDS, .check = vgi_gltf_check, .begin = begin_gltf, .put = vgi_gltf_put, .end = vgi_gltf_end,

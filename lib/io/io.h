@@ -212,6 +212,8 @@ int vgi_output_put(vgi_output *o, const void *data, size_t n, vg_err *e) VG_MUST
 /* of bytes already put */
 int vgi_output_patch(vgi_output *o, uint64_t off, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
 int vgi_output_flush(vgi_output *o, vg_err *e) VG_MUST_CHECK;
+enum { VGI_USES_AXES = 1, VGI_USES_OBJECTS = 2, VGI_USES_GLTF = 4 }; /* GLTF: animation, shapes, unwelded */
+
 /* the first n bytes of a regular file */
 int vgi_output_copy(vgi_output *o, int fd, uint64_t n, vg_err *e) VG_MUST_CHECK;
 void vgi_output_clear(vgi_output *o);
@@ -220,6 +222,7 @@ typedef struct vgi_sequence_format {
     const char *name, *suffix;
     unsigned keeps;
     bool bare; /* read a file without faces as points */
+    unsigned uses; /* the options of vg_reading that it has a use for */
     /* from the first 4096 bytes, or all; NULL: recognised by the name alone */
     bool (*sniff)(const unsigned char *data, size_t n);
 

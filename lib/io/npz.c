@@ -674,7 +674,7 @@ static bool sniff_npz(const unsigned char *data, size_t n)
 }
 
 const vgi_sequence_format vgi_sequence_npz = {
-    .name = "npz", .suffix = ".npz",
+    .name = "npz", .suffix = ".npz", .uses = VGI_USES_AXES,
     .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES |
              VGI_KEEPS_DOUBLES,
     .sniff = sniff_npz, .open = open_npz, .next = next_npz, .frames = count_frames, .note = note_of,

@@ -178,6 +178,7 @@ static void close_objects(void *state)
 const vgi_sequence_format vgi_sequence_objects = {
     .name = "obj",
     .suffix = ".obj",
+    .uses = VGI_USES_OBJECTS,
     .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_COLOURS | VGI_KEEPS_LABELS | VGI_KEEPS_NAMES,
     .open = open_objects,
     .next = next_object,

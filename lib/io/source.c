@@ -28,6 +28,7 @@ struct vg_source {
     vgi_items items;
     size_t next;         /* the next item to open */
     vg_reading reading;
+    unsigned used;       /* VGI_USES_*, of the inputs opened so far */
     bool through;        /* a single stream: its head and frames are passed on unchanged */
     vg_head head;        /* of the joined sequence; the caller may change it */
     vg_head own;         /* the head of the frames: mesh, kind, count; for a skeleton also its joints and reference */
@@ -333,6 +334,7 @@ static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, 
 {
     vgi_playing *p = &s->playing;
     vg_head h = {0};
+    s->used |= format->uses;
     int r = vgi_play_open(p, format, in, &s->reading, subject_of(archive, path, e), pose_of(path, e), &h, e);
     if (r == VG_OK && format->note) note_left_out(s, p->subject, format->note(p->state));
     if (r == VG_OK && format->join && !s->own.body.skeleton.njoints)
@@ -501,6 +503,23 @@ static int step_source(vg_source *s, vg_frame *f, vg_err *e)
     if (!s->reader) return open_next(s, e);
     int r = vg_reader_next(s->reader, f, e);
     return r == 0 ? end_reader(s, e) : r;
+}
+
+const char *vg_source_ignored(const vg_source *s)
+{
+    const vg_reading *o = &s->reading;
+    const struct {
+        const char *name;
+        bool given;
+        unsigned of;
+    } all[] = {{"array_axes", o->array_axes, VGI_USES_AXES},
+               {"objects", o->objects, VGI_USES_OBJECTS},
+               {"animation", o->animation, VGI_USES_GLTF},
+               {"shapes", o->shapes, VGI_USES_GLTF},
+               {"unwelded", o->unwelded, VGI_USES_GLTF}};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        if (all[i].given && !(s->used & all[i].of)) return all[i].name;
+    return NULL;
 }
 
 bool vg_source_may_wait(const vg_source *s)

@@ -89,6 +89,9 @@ int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, co
 /* vg_source_warning: one line on what was dropped from the input that holds the mesh; NULL: nothing. Borrowed
  * until close. */
 const char *vg_source_warning(const vg_source *s);
+/* vg_source_ignored: after the last frame, the first member of vg_reading that was set although no input was of a format that uses
+ * it (of array_axes, objects, animation, shapes, unwelded); NULL: none. */
+const char *vg_source_ignored(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);
 int vg_source_next(vg_source *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 bool vg_source_may_wait(const vg_source *s); /* as vg_reader_may_wait */
