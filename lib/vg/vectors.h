@@ -201,7 +201,7 @@ size_t vg_solver_batch(const vg_solver *s);
 vg_solver_stats vg_solver_get_stats(const vg_solver *s);
 
 /* The least absolute misfit (MATH 2, Robust): poses that minimise the sum over faces of sqrt(e^2 + c^2), e the misfit of
- * a face in the metric of the solver, instead of the sum of e^2. What a few inconsistent faces want stays with them;
+ * a face in the metric of the solver, instead of the sum of e^2. The misfit of a few inconsistent faces stays local;
  * consistent vectors are met exactly. By a quasi-Newton search from the plain solution, one solve a round. */
 typedef struct vg_robust vg_robust;
 typedef struct vg_robust_stats {
@@ -213,13 +213,13 @@ typedef struct vg_robust_stats {
  * solution. VG_EARG unless eps > 0. */
 int vg_robust_new(vg_robust **r, const vg_solver *s, size_t rounds, double eps, vg_err *e) VG_MUST_CHECK;
 void vg_robust_free(vg_robust **r);
-/* vg_robust_load: what a solve needs of the vectors of n poses, whose guesses vg_solver_load has made: misfits[i] has
- * room for vg_robust_misfits numbers, sizes for one number a pose. */
+/* vg_robust_load: prepare the solution of n poses from their vectors and the first guesses of vg_solver_load. Out: misfits[i],
+ * vg_robust_misfits numbers for pose i, and sizes, one number per pose. */
 size_t vg_robust_misfits(const vg_robust *r);
 void vg_robust_load(const vg_robust *r, size_t n, const double *const *vectors, const double *const *guesses,
                     float *const *misfits, double *sizes);
-/* vg_robust_solve: in place of vg_solver_solve, or of vg_solver_solve_each where each is not NULL; its solvers are that
- * of r, or like it. The first call makes room for one block of eight poses per thread. */
+/* vg_robust_solve: instead of vg_solver_solve, or of vg_solver_solve_each if `each` is not NULL; its solvers are that of r or
+ * made like it. The first call allocates workspace for eight poses per thread. */
 int vg_robust_solve(vg_robust *r, size_t n, vg_solver *const *each, const double *const *rhs, const float *const *misfits, const double *sizes,
                     double *const *x, const double *const *anchors, const double *const *roots,
                     vg_err *e) VG_MUST_CHECK;
@@ -240,12 +240,10 @@ typedef struct vg_planar_stats {
 int vg_planar_new(vg_planar **p, const vg_solver *s, double fidelity, double planarity, vg_err *e) VG_MUST_CHECK;
 void vg_planar_free(vg_planar **p);
 size_t vg_planar_faces(const vg_planar *p);
-/* vg_planar_load: of one pose's given vectors what is needed later: the m_f, 3 numbers for each of
- * vg_planar_faces. */
+/* vg_planar_load: from the given vectors of a pose the m_f: 3 numbers for each of vg_planar_faces. */
 void vg_planar_load(const vg_planar *p, const double *vectors, double *normals);
-/* vg_planar_solve: n poses x from vg_solver_solve, with their normals, become more nearly planar in place; anchors
- * stay, or the root does, and vertices in no face. Returns the number of the first pose that did not converge; n when
- * all did. */
+/* vg_planar_solve: make the faces of n poses x from vg_solver_solve more nearly planar, in place; anchors (or the root) and
+ * vertices in no face do not move. Returns the number of the first pose that did not converge; n if all did. */
 size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, double *const *x);
 vg_planar_stats vg_planar_get_stats(const vg_planar *p);
 
@@ -262,8 +260,8 @@ void vg_guide_key(vg_guide *g, uint64_t frame, double *pose, const double *given
  * key, or, with a single key, any. Without keys the pose is unchanged. */
 void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose);
 
-/* Guidance over the pose: the offsets of all keys are mixed by the coordinates of a pose in the keys' poses, so that a key
- * helps wherever poses are like its own. In time where two keys have the same pose. */
+/* Guidance over the pose: the offsets of all keys are blended by the coordinates of a pose in the keys' poses, so that a key
+ * corrects all poses that resemble its own; blended in time between keys of the same pose. */
 typedef struct vg_pose_guide vg_pose_guide;
 /* keys: the largest number of keys. */
 int vg_pose_guide_new(vg_pose_guide **g, size_t nv, size_t keys, vg_err *e) VG_MUST_CHECK;
