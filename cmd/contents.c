@@ -45,7 +45,7 @@ static void list_frame(report *r, const vg_head *h, const vg_frame *f, uint64_t 
     report_row(r, row);
 }
 
-/* The frame goes on with the last animation, or begins one. */
+/* The frame continues the last animation, or begins one. */
 static void note_animation(contents *c, const vg_frame *f)
 {
     uint64_t number = 0;

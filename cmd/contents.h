@@ -1,11 +1,11 @@
-/* contents.h: vg-info: what reading all frames of a sequence tells, and its reports.
+/* contents.h: vg-info: what follows from reading all frames of a sequence, and the reports of it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CONTENTS_H
 #define VG_CONTENTS_H
 
 #include "report.h"
 
-/* A channel that frames bring. */
+/* A channel of frames. */
 typedef struct channel_note {
     char *name, *unit, *element; /* of the first frame that has it */
     size_t width;
@@ -20,7 +20,7 @@ typedef struct animation {
     double first_time, last_time; /* NaN: it has none */
 } animation;
 
-/* What reading all frames tells. */
+/* What follows from all frames. */
 typedef struct contents {
     uint64_t frames, timed, turned, extra; /* turned: that say how joints have turned; extra: unknown records before
                                               frames */

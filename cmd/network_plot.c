@@ -52,7 +52,7 @@ static vg_chart *add_chart(curves *c, const char *x, const char *y)
     return chart;
 }
 
-/* Whether a logarithmic axis tells more. */
+/* Whether the numbers need a logarithmic axis. */
 static bool is_wide(const double *y, size_t n)
 {
     double least = INFINITY, most = 0;

@@ -5,8 +5,8 @@
 
 #include "cli.h"
 
-/* network_plot_write: its loss, its error in the validation block, and its errors in held-out frames beside what takes no
- * learning, as PNG or SVG, to the output. label: what it is called. */
+/* network_plot_write: charts of the loss, the error in the validation block, and the errors in held-out frames of all methods,
+ * as PNG or SVG, to the output. label: the title. */
 void network_plot_write(const vg_network *n, const char *label, bool svg);
 
 #endif

@@ -5,7 +5,7 @@
 
 #include "report.h"
 
-/* network_methods: what a network is measured beside, and it. */
+/* network_methods: names of the methods of vg_network_errors, in its order; the network is the last. */
 extern const char *const network_methods[VG_NETWORK_METHODS];
 
 /* report_network: layers, parameters, what it was trained on, and its errors in frames that were held out. */

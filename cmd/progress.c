@@ -170,7 +170,7 @@ static void begin_phase(const char *label, uint64_t first, double now)
     if (progress.label && !strcmp(progress.label, label)) return;
     progress.label = label, progress.phase_first = first;
     progress.phase_started = now;
-    if (progress.json) progress.last = -interval; /* a program is told at once */
+    if (progress.json) progress.last = -interval; /* report it at once */
 }
 
 /* Is it time for another line? */

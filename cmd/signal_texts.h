@@ -1,4 +1,5 @@
-/* signal_texts.h: what people write about signals beside edits: places, times, curves. All stop with the line that is wrong.
+/* signal_texts.h: reads the texts of options on signals other than edits: places, times, curves. A malformed line stops the
+ * program.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CMD_SIGNAL_TEXTS_H
 #define VG_CMD_SIGNAL_TEXTS_H

@@ -154,7 +154,7 @@ static void run_batch(work *w, size_t n, const double *const *in, double *const 
     case TRANSFER: vg_deformer_transfer(w->deformer, n, w->kind, in, out); break;
     case CARRY: carry_batch(w, n, in, out); break;
     case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
-    case JOINTS: break; /* with what a frame says beside its values */
+    case JOINTS: break; /* in finish_frame */
     case RIDE:
         for (size_t i = 0; i < n; i++) vg_rider_apply(w->rider, in[i], out[i]);
         break;
@@ -170,7 +170,7 @@ static size_t leave_sculpted(work *w, const uint32_t *still, size_t n)
     return kept;
 }
 
-/* What a frame says beside its values. */
+/* Name, time and channels of a frame. */
 static void finish_frame(work *w, vg_frame *in, vg_frame *out)
 {
     vg_err e;

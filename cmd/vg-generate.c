@@ -169,8 +169,7 @@ static void warn_of_motion(const vg_generator *g)
         cli_warn("the poses drift: at the end they are outside the training range by %.0f %% of it", 100 * drift);
 }
 
-/* The poses that are given go out, too, each before the next is read; then those that go on, each before the next is
- * computed. */
+/* Write the given poses, each before the next is read, then the generated ones, each before the next is computed. */
 static void go_on(vg_generator *g, vg_source *s)
 {
     vg_frame f = {0};

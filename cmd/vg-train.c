@@ -1,6 +1,7 @@
 /* vg-train: train a network to continue a sequence of poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "fitting.h"
+#include "networks.h"
 
 #include <errno.h>
 #include <math.h>
@@ -321,8 +322,6 @@ static int best_of(const vg_network_errors *x, int most)
 
 static void report_errors(vg_trainer *t, const vg_train_state *s)
 {
-    static const char *const names[VG_NETWORK_METHODS] = {"the last frame again", "on in a line", "on in a line, damped",
-                                                          "the regression alone", "the network"};
     vg_network_errors x;
     vg_err e;
     cli_working("measuring held-out frames");
@@ -334,22 +333,22 @@ static void report_errors(vg_trainer *t, const vg_train_state *s)
     cli_say("%zu training frames, %zu held out: mean error of a vertex in %% of D, 5, 10 and 15 frames ahead", s->frames,
             s->held);
     cli_say("%-22s%24s%24s", "", "1 frame given", "3 frames given");
-    for (int m = 0; m < VG_NETWORK_METHODS; m++) print_row(names[m], &x, m);
+    for (int m = 0; m < VG_NETWORK_METHODS; m++) print_row(network_methods[m], &x, m);
     int best = best_of(&x, VG_NETWORK_METHODS);
     if (best != VG_NETWORK_METHODS - 1)
-        cli_say("the network is worse on held-out frames than '%s'", names[best]);
+        cli_say("the network is worse on held-out frames than '%s'", network_methods[best]);
 }
 
-/* What the network goes on by, where that is less than regression and layers. */
+/* How the network continues poses, if not by regression and layers. */
 static void report_forecast(const vg_network *n, const vg_train_state *s)
 {
     if (n->model != VG_NETWORK_AUTO) return;
     void (*tell)(const char *, ...) = n->windows ? cli_say : cli_note;
     bool damped = n->ridge >= damped_ridge, alone = !s->best_iteration && n->ncurve_block;
     if (damped)
-        tell("in the training frames nothing is better than going on in a line, damped by %g a frame: the network goes on so%s",
-             n->damping, alone ? "" : ", with what its layers correct");
-    else if (alone) tell("the layers correct nothing in the validation block: the network is the regression alone");
+        tell("on the training frames nothing is better than linear continuation, damped by %g a frame: the network uses it%s",
+             n->damping, alone ? "" : ", corrected by its layers");
+    else if (alone) tell("the layers improve nothing in the validation block: the network is the regression alone");
 }
 
 /* Other outputs must have different names from the network. */

@@ -266,10 +266,10 @@ static void open_truth(side *truth, const side *result)
         cli_die(&e);
 }
 
-/* All that is shown: the result, the truth it is compared with, if any, and what stands beside. */
+/* All sequences shown: the result, the truth it is compared with, if any, and those of --beside. */
 typedef struct cast {
     side result, truth, beside[VG_PAGE_SEQUENCES];
-    bool compared[VG_PAGE_SEQUENCES]; /* of beside: it is of the truth's mesh */
+    bool compared[VG_PAGE_SEQUENCES]; /* of --beside: has the mesh of the truth */
 } cast;
 
 static void open_cast(cast *c, char **operands, size_t n)
@@ -294,8 +294,8 @@ static void close_cast(cast *c)
 /* Called with a frame of sequence i; truth: the frame it is compared with, or NULL. */
 typedef void take_frame(void *context, size_t i, const side *s, const double *truth);
 
-/* The next frame of what stands beside. Behind the end of the truth there is nothing to compare it with;
- * check_counts says so. */
+/* The next frame of sequence i of --beside. After the end of the truth it is compared with nothing; check_counts reports
+ * this. */
 static bool put_beside(cast *c, size_t i, const double *truth, bool truth_is_shown, take_frame *put, void *context)
 {
     side *s = &c->beside[i];
@@ -325,7 +325,7 @@ static void refuse_count(const side *s, const side *truth)
              truth->name, truth->frames);
 }
 
-/* What is compared beside may end before the truth, and then stays at its last frame. */
+/* A sequence of --beside may end before the truth, and then stays at its last frame. */
 static void check_counts(const cast *c)
 {
     if (opts.against && c->result.frames != c->truth.frames) refuse_count(&c->result, &c->truth);

@@ -182,7 +182,7 @@ def vertices_of(poses):
 
 
 def vertex_line(poses, held):
-    """errors of going on in a line, and damped, of vertices instead of features, in the windows of vg-train's table"""
+    """errors of linear and damped continuation of vertices instead of features, in the windows of vg-train's table"""
     frames = vertices_of(poses)
     extent = json.loads(subprocess.check_output(["vg-info", "--json", poses]))["mesh"]["D"]
     ahead, starts = (5, 10, 15), range(len(frames) - held, len(frames) - 14)
