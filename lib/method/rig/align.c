@@ -12,7 +12,7 @@
 #include <stdlib.h>
 
 static const uint32_t NONE = UINT32_MAX;
-static const double APART = 20, ALIKE = 3;
+static const double APART = 8, ALIKE = 3;
 static const double LONG = 0.1; /* a bone of unknown role counts as a limb if it is at least this long, relative to
                                  * the skeleton's diagonal */
 

@@ -15,6 +15,7 @@ struct vg_driver {
     const vg_skeleton *by;
     uint32_t *from;  /* per joint of the rig: the paired joint, or UINT32_MAX */
     bool *carried;   /* per joint of the rig: paired, with no paired joint above it */
+    uint32_t *lead;  /* per joint of the rig without a paired joint at or above it: the first carried joint below it */
     double *before;  /* per joint of the rig: a rotation applied before the other's, 4 numbers */
     double *degrees; /* per joint of the rig: the angle of alignment */
     vgi_stance stance;
@@ -59,6 +60,17 @@ static int compare_rests(vg_driver *d, const vg_driver_options *o, vg_err *e)
     return r;
 }
 
+/* A root that the skeleton does not have, such as the one of Biped above the pelvis, moves with the joint below it. */
+static void find_leads(vg_driver *d)
+{
+    const vg_skeleton *s = &d->r->skeleton;
+    for (size_t j = 0; j < s->njoints; j++) d->lead[j] = NONE;
+    for (size_t j = 0; j < s->njoints; j++) {
+        uint32_t above = d->carried[j] ? s->joints[j].parent : NONE;
+        for (; above != NONE && d->lead[above] == NONE; above = s->joints[above].parent) d->lead[above] = (uint32_t)j;
+    }
+}
+
 static int pair_joints(vg_driver *d, const uint32_t *partner, vg_err *e)
 {
     const vg_skeleton *s = &d->r->skeleton;
@@ -71,6 +83,7 @@ static int pair_joints(vg_driver *d, const uint32_t *partner, vg_err *e)
         d->carried[j] = d->from[j] != NONE && above == NONE;
         if (s->joints[j].nchannels) *(d->from[j] != NONE ? &found : &d->missing) += 1;
     }
+    find_leads(d);
     if (found) return VG_OK;
     return vg_fail(e, VG_EINPUT,
                    "no joint of the skeleton has the name of a bone of the rig, such as '%.80s', nor a usual name "
@@ -85,9 +98,10 @@ int vg_driver_new(vg_driver **out, const vg_rig *g, const vg_skeleton *by, const
     if (!d) return VG_ENOMEM;
     d->r = g, d->by = by;
     d->from = vgi_array(n, sizeof *d->from, e), d->before = vgi_array(4 * n, sizeof *d->before, e);
-    d->carried = vgi_array(n, sizeof *d->carried, e), d->degrees = vgi_array(n, sizeof *d->degrees, e);
-    d->positions = vgi_array(3 * n, sizeof *d->positions, e), d->turns = vgi_array(4 * n, sizeof *d->turns, e);
-    bool all = d->from && d->before && d->carried && d->degrees && d->positions && d->turns;
+    d->carried = vgi_array(n, sizeof *d->carried, e), d->lead = vgi_array(n, sizeof *d->lead, e);
+    d->degrees = vgi_array(n, sizeof *d->degrees, e), d->positions = vgi_array(3 * n, sizeof *d->positions, e);
+    d->turns = vgi_array(4 * n, sizeof *d->turns, e);
+    bool all = d->from && d->before && d->carried && d->lead && d->degrees && d->positions && d->turns;
     int r = all ? pair_joints(d, o->partner, e) : VG_ENOMEM;
     if (r == VG_OK) r = compare_rests(d, o, e);
     if (r < 0) vg_driver_free(out);
@@ -100,6 +114,7 @@ void vg_driver_free(vg_driver **out)
     if (!d) return;
     free(d->from);
     free(d->carried);
+    free(d->lead);
     free(d->before);
     free(d->degrees);
     free(d->positions);
@@ -171,10 +186,29 @@ static void place_joint(vg_driver *d, size_t j, const double *positions, const d
     for (size_t i = 0; i < 3; i++) p[i] += d->positions[3 * (size_t)joint->parent + i] + d->scale * slip[i];
 }
 
+/* Joint j as if it were rigid with the joint that it follows, as both are in the reference pose. */
+static void follow_lead(vg_driver *d, size_t j, const double *positions, const double *turns)
+{
+    size_t lead = d->lead[j];
+    const double *at = d->r->turn + 4 * lead, back[4] = {at[0], -at[1], -at[2], -at[3]};
+    double way[3], turn[4], *p = d->positions + 3 * j;
+    turn_joint(d, lead, turns);
+    place_joint(d, lead, positions, turns);
+    vg_quat_multiply(d->turns + 4 * lead, back, turn);
+    vg_quat_multiply(turn, d->r->turn + 4 * j, d->turns + 4 * j);
+    vgi_between(d->r->at, lead, j, way);
+    vg_quat_apply(turn, way, p);
+    vgi_add(p, d->positions + 3 * lead);
+}
+
 void vg_driver_joints(vg_driver *d, const double *positions, const double *turns, const double **own_positions,
                       const double **own_turns)
 {
     for (size_t j = 0; j < d->r->skeleton.njoints; j++) {
+        if (d->lead[j] != NONE) {
+            follow_lead(d, j, positions, turns);
+            continue;
+        }
         turn_joint(d, j, turns);
         place_joint(d, j, positions, turns);
     }

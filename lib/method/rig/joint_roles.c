@@ -1,199 +1,174 @@
-/* joint_roles.c: the role of a joint in the body. Its name is split into words, prefix and side are removed, and the
- * remainder is looked up. Joints whose names leave the role open get it from the tree of joints.
- * Joints of two skeletons are matched in pair_joints.c.
+/* joint_roles.c: the role of a joint in the body. What names tell comes from joint_names.c; what they leave open is decided
+ * here, by the other roles and the tree of joints. Joints of two skeletons are matched in pair_joints.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/joint_roles.h"
 
-#include <ctype.h>
 #include <stdlib.h>
 
-enum { KEY = 40, WORD = 40 };
 static const uint32_t NONE = UINT32_MAX;
 
-/* A name without prefix and side: its letters in lower case, and the first number in it. */
-typedef struct key {
-    char text[KEY];
-    int number; /* -1: no number */
+/* The joints of one side while its roles are decided; side 0 is the middle. */
+typedef struct body_side {
+    const vg_skeleton *s;
+    vgi_role *roles;
     int side;
-} key;
+} body_side;
 
-static const char *const prefixes[] = {"mixamorig", "bip001",  "bip01", "character1", "cc_base_", "def-",
-                                       "org-",      "j_bip_c", "j_bip_", "valvebiped"};
-
-static const struct {
-    const char *text;
-    vgi_part part;
-} parts[] = {{"root", VGI_ROOT},          {"hips", VGI_HIPS},         {"hip", VGI_HIPS},
-             {"pelvis", VGI_HIPS},        {"spine", VGI_SPINE},       {"lowerback", VGI_SPINE},
-             {"back", VGI_SPINE},         {"chest", VGI_SPINE},       {"upperchest", VGI_SPINE},
-             {"chestlower", VGI_SPINE},   {"chestupper", VGI_SPINE},  {"abdomen", VGI_SPINE},
-             {"abdomenlower", VGI_SPINE}, {"abdomenupper", VGI_SPINE}, {"torso", VGI_SPINE},
-             {"waist", VGI_SPINE},        {"neck", VGI_NECK},         {"necklower", VGI_NECK},
-             {"neckupper", VGI_NECK},     {"head", VGI_HEAD},         {"clavicle", VGI_CLAVICLE},
-             {"collar", VGI_CLAVICLE},    {"shoulder", VGI_SHOULDER}, {"upperarm", VGI_UPPER_ARM},
-             {"uparm", VGI_UPPER_ARM},    {"arm", VGI_UPPER_ARM},     {"shldr", VGI_UPPER_ARM},
-             {"shldrbend", VGI_UPPER_ARM}, {"forearm", VGI_FOREARM},  {"forearmbend", VGI_FOREARM},
-             {"lowerarm", VGI_FOREARM},   {"lowarm", VGI_FOREARM},    {"elbow", VGI_FOREARM},
-             {"hand", VGI_HAND},          {"wrist", VGI_HAND},        {"thumb", VGI_THUMB},
-             {"handthumb", VGI_THUMB},    {"index", VGI_INDEX},       {"handindex", VGI_INDEX},
-             {"handfinger", VGI_INDEX},   {"findex", VGI_INDEX},      {"middle", VGI_MIDDLE},
-             {"mid", VGI_MIDDLE},         {"handmiddle", VGI_MIDDLE}, {"fmiddle", VGI_MIDDLE},
-             {"ring", VGI_RING},          {"handring", VGI_RING},     {"fring", VGI_RING},
-             {"pinky", VGI_PINKY},        {"handpinky", VGI_PINKY},   {"fpinky", VGI_PINKY},
-             {"little", VGI_PINKY},       {"hipjoint", VGI_HIP_JOINT}, {"thigh", VGI_THIGH},
-             {"thighbend", VGI_THIGH},    {"upleg", VGI_THIGH},       {"upperleg", VGI_THIGH},
-             {"shin", VGI_SHIN},          {"calf", VGI_SHIN},         {"leg", VGI_SHIN},
-             {"lowleg", VGI_SHIN},        {"lowerleg", VGI_SHIN},     {"knee", VGI_SHIN},
-             {"foot", VGI_FOOT},          {"ankle", VGI_FOOT},        {"toe", VGI_TOE},
-             {"toes", VGI_TOE},           {"toebase", VGI_TOE},       {"ball", VGI_TOE},
-             {"upperback", VGI_SPINE},    {"thorax", VGI_SPINE},      {"lowerneck", VGI_NECK},
-             {"upperneck", VGI_NECK},     {"humerus", VGI_UPPER_ARM}, {"radius", VGI_FOREARM},
-             {"fingers", VGI_INDEX},      {"femur", VGI_THIGH},       {"tibia", VGI_SHIN}};
-
-/* The name after the last ':' or '|' and after a known prefix. */
-static const char *without_prefix(const char *name)
+static uint32_t find_from(const body_side *x, vgi_part part, size_t first)
 {
-    for (const char *c = name; *c; c++)
-        if ((*c == ':' || *c == '|') && c[1]) name = c + 1;
-    for (size_t i = 0; i < sizeof prefixes / sizeof *prefixes; i++) {
-        size_t n = strlen(prefixes[i]), k = 0;
-        while (k < n && tolower((unsigned char)name[k]) == prefixes[i][k]) k++;
-        if (k == n && name[n]) return name + n;
-    }
-    return name;
+    for (size_t j = first; j < x->s->njoints; j++)
+        if (x->roles[j].part == part && x->roles[j].side == x->side) return (uint32_t)j;
+    return NONE;
 }
 
-/* The next word of a name, in lower case: "LeftUpLeg", "LHipJoint" and "upper_arm.L" have three each. Returns the
- * position after the word, or NULL at the end. */
-static const char *next_word(const char *at, char word[WORD])
+static bool has_part(const body_side *x, vgi_part part)
+{
+    return find_from(x, part, 0) != NONE;
+}
+
+static size_t count_part(const body_side *x, vgi_part part)
 {
     size_t n = 0;
-    while (*at && !isalnum((unsigned char)*at)) at++;
-    if (!*at) return NULL;
-    bool digits = isdigit((unsigned char)*at);
-    for (; n + 1 < WORD && isalnum((unsigned char)*at); at++) {
-        unsigned char c = (unsigned char)at[0], before = n ? (unsigned char)at[-1] : 0;
-        if ((bool)isdigit(c) != digits) break;
-        if (n && isupper(c) && (islower(before) || islower((unsigned char)at[1]))) break;
-        word[n++] = (char)tolower(c);
-    }
-    word[n] = 0;
-    return at;
+    for (uint32_t j = find_from(x, part, 0); j != NONE; j = find_from(x, part, j + 1)) n++;
+    return n;
 }
 
-/* Remove "left" or "right" from the front of a word. */
-static const char *take_side(const char *word, int *side)
+static void rename_part(const body_side *x, vgi_part from, vgi_part to)
 {
-    if (!strcmp(word, "l") || !strcmp(word, "r")) {
-        *side = *word == 'l' ? 1 : -1;
-        return "";
-    }
-    if (!strncmp(word, "left", 4)) *side = 1, word += 4;
-    else if (!strncmp(word, "right", 5)) *side = -1, word += 5;
-    return word;
+    for (uint32_t j = find_from(x, from, 0); j != NONE; j = find_from(x, from, j + 1)) x->roles[j].part = (uint8_t)to;
 }
 
-static key read_key(const char *name)
+static bool is_above(const vg_skeleton *s, uint32_t above, uint32_t below)
 {
-    key k = {.number = -1};
-    char word[WORD];
-    for (const char *at = without_prefix(name); (at = next_word(at, word));) {
-        if (isdigit((unsigned char)*word)) {
-            if (k.number < 0) k.number = (int)strtol(word, NULL, 10);
-            continue;
-        }
-        const char *rest = take_side(word, &k.side);
-        size_t n = strlen(k.text);
-        snprintf(k.text + n, sizeof k.text - n, "%s", rest);
-    }
-    return k;
+    while (below != NONE && below != above) below = s->joints[below].parent;
+    return below == above;
 }
 
-static vgi_part find_part(const char *text)
+/* Names such as "arm_1, arm_2, arm_3": the joints of `from`, in order, are the n parts of `to`; a part that is known by its
+ * own name ends them. */
+static void deal_parts(const body_side *x, vgi_part from, const vgi_part *to, size_t n)
 {
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        if (!strcmp(text, parts[i].text)) return parts[i].part;
-    return VGI_NO_PART;
-}
-
-static vgi_role look_up(const char *name)
-{
-    key k = read_key(name);
-    vgi_part part = find_part(k.text);
-    if (!part && !k.side && (*k.text == 'l' || *k.text == 'r')) /* CMU's own files: "lfemur" */
-        if ((part = find_part(k.text + 1))) k.side = *k.text == 'l' ? 1 : -1;
-    vgi_role role = {.side = (int8_t)k.side, .part = (uint8_t)part};
-    if (!strcmp(k.text, "finger") && k.number >= 1 && k.number <= 5) role.part = (uint8_t)(VGI_THUMB + k.number - 1);
-    if (role.part == VGI_HIPS && role.side) role.part = VGI_SIDED_HIP;
-    if ((role.part >= VGI_CLAVICLE) != (role.side != 0)) role = (vgi_role){0};
-    return role;
-}
-
-/* ---- roles from the tree of joints ---- */
-
-static bool has_role(const vgi_role *roles, size_t n, vgi_part part, int side)
-{
-    for (size_t j = 0; j < n; j++)
-        if (roles[j].part == part && (!side || roles[j].side == side)) return true;
-    return false;
-}
-
-static void rename_part(vgi_role *roles, size_t n, vgi_part from, vgi_part to, int side)
-{
-    for (size_t j = 0; j < n; j++)
-        if (roles[j].part == from && roles[j].side == side) roles[j].part = (uint8_t)to;
-}
-
-static void decide_side(vgi_role *roles, size_t n, int side)
-{
-    bool clavicle = has_role(roles, n, VGI_CLAVICLE, side), arm = has_role(roles, n, VGI_UPPER_ARM, side);
-    bool thigh = has_role(roles, n, VGI_THIGH, side);
-    vgi_part shoulder = arm ? (clavicle ? VGI_NO_PART : VGI_CLAVICLE) : VGI_UPPER_ARM;
-    rename_part(roles, n, VGI_SHOULDER, shoulder, side);
-    rename_part(roles, n, VGI_SIDED_HIP, thigh ? VGI_HIP_JOINT : VGI_THIGH, side);
-}
-
-/* below[j]: whether joint j or one below it has this part. */
-static void find_above(const vg_skeleton *s, const vgi_role *roles, vgi_part part, bool *below)
-{
-    for (size_t j = s->njoints; j-- > 0;) {
-        below[j] = below[j] || roles[j].part == part;
-        if (below[j] && s->joints[j].parent != NONE) below[s->joints[j].parent] = true;
+    for (size_t i = 0; i < n && !(i && has_part(x, to[i])); i++) {
+        uint32_t j = find_from(x, from, 0);
+        if (j == NONE) return;
+        x->roles[j].part = (uint8_t)to[i];
     }
 }
 
-/* Rigify: the first spine joint, whose children are the thighs, is the hips; spine joints above the arms are neck and
- * head. */
-static void divide_spine(const vg_skeleton *s, vgi_role *roles, bool *below)
+static void decide_arm(const body_side *x)
 {
-    size_t n = s->njoints, last = n;
-    if (!has_role(roles, n, VGI_HIPS, 0)) rename_part(roles, n, VGI_ROOT, VGI_HIPS, 0);
-    if (!has_role(roles, n, VGI_HIPS, 0)) {
-        find_above(s, roles, VGI_THIGH, below);
-        for (size_t j = 0; j < n; j++)
-            if (roles[j].part == VGI_SPINE && below[j]) {
-                roles[j].part = VGI_HIPS;
-                break;
-            }
-        memset(below, 0, n * sizeof *below);
+    static const vgi_part whole[] = {VGI_UPPER_ARM, VGI_FOREARM, VGI_HAND};
+    size_t arms = count_part(x, VGI_ARM);
+    bool clavicle = has_part(x, VGI_CLAVICLE), upper = has_part(x, VGI_UPPER_ARM), fore = has_part(x, VGI_FOREARM);
+    if (upper) rename_part(x, VGI_ARM, fore ? VGI_NO_PART : VGI_FOREARM);
+    else if (fore) rename_part(x, VGI_ARM, VGI_UPPER_ARM);
+    else deal_parts(x, VGI_ARM, whole, 3);
+    rename_part(x, VGI_SHOULDER, !upper && !arms ? VGI_UPPER_ARM : clavicle ? VGI_NO_PART : VGI_CLAVICLE);
+}
+
+static void decide_leg(const body_side *x)
+{
+    static const vgi_part whole[] = {VGI_THIGH, VGI_SHIN, VGI_FOOT, VGI_TOE};
+    size_t legs = count_part(x, VGI_LEG);
+    bool thigh = has_part(x, VGI_THIGH), shin = has_part(x, VGI_SHIN);
+    if (!thigh && !shin && legs > 1) deal_parts(x, VGI_LEG, whole, 4);
+    else if (!thigh && shin) rename_part(x, VGI_LEG, VGI_THIGH);
+    rename_part(x, VGI_LEG, has_part(x, VGI_SHIN) ? VGI_NO_PART : VGI_SHIN);
+    vgi_part above = has_part(x, VGI_THIGH) ? VGI_NO_PART : VGI_THIGH;
+    rename_part(x, VGI_SIDED_HIP, above ? above : VGI_HIP_JOINT);
+    if (!has_part(x, VGI_THIGH)) rename_part(x, VGI_HIP_JOINT, VGI_THIGH);
+}
+
+/* The joint called `from` becomes `to`. One below it that is called so becomes `below`; one above it stays. */
+static void decide_end(const body_side *x, vgi_part from, vgi_part to, vgi_part below)
+{
+    uint32_t end = find_from(x, from, 0), other = find_from(x, to, 0);
+    if (end != NONE && other != NONE && is_above(x->s, end, other)) rename_part(x, to, below);
+    rename_part(x, from, has_part(x, to) ? VGI_NO_PART : to);
+}
+
+/* A limb whose end has no name that is known: of the nameless joints below it, the first on the way to the farthest. */
+static void find_end(const body_side *x, vgi_part limb, vgi_part end, const double *at)
+{
+    uint32_t up = find_from(x, limb, 0), best = NONE;
+    double most = 0;
+    if (up == NONE || has_part(x, end)) return;
+    for (size_t j = up + 1; j < x->s->njoints; j++) {
+        uint32_t child = (uint32_t)j;
+        if (!is_above(x->s, up, child)) continue;
+        while (x->s->joints[child].parent != up) child = x->s->joints[child].parent;
+        double far = 0;
+        for (int k = 0; k < 3; k++) far += (at[3 * j + k] - at[3 * up + k]) * (at[3 * j + k] - at[3 * up + k]);
+        if (x->roles[child].part == VGI_NO_PART && far > most * (1 + 1e-9)) best = child, most = far;
     }
-    if (has_role(roles, n, VGI_NECK, 0) || !has_role(roles, n, VGI_UPPER_ARM, 0)) return;
-    find_above(s, roles, VGI_UPPER_ARM, below);
-    for (size_t j = 0; j < n; j++)
-        if (roles[j].part == VGI_SPINE && !below[j]) roles[j].part = VGI_NECK, last = j;
-    if (last < n && !has_role(roles, n, VGI_HEAD, 0)) roles[last].part = VGI_HEAD;
+    if (best != NONE) x->roles[best] = (vgi_role){.part = (uint8_t)end, .side = (int8_t)x->side};
+}
+
+static void decide_side(const body_side *x, const double *at)
+{
+    decide_end(x, VGI_WRIST, VGI_HAND, VGI_NO_PART);
+    decide_end(x, VGI_ANKLE, VGI_FOOT, VGI_TOE);
+    decide_end(x, VGI_PALM, VGI_HAND, VGI_HAND);
+    decide_arm(x);
+    decide_leg(x);
+    find_end(x, VGI_FOREARM, VGI_HAND, at);
+    find_end(x, VGI_SHIN, VGI_FOOT, at);
+}
+
+/* ---- the middle ---- */
+
+/* The last joint that is above both thighs. */
+static uint32_t find_between_thighs(const vg_skeleton *s, vgi_role *roles)
+{
+    uint32_t left = find_from(&(body_side){s, roles, 1}, VGI_THIGH, 0), right = find_from(&(body_side){s, roles, -1}, VGI_THIGH, 0);
+    while (left != NONE && right != NONE && !is_above(s, left, right)) left = s->joints[left].parent;
+    return right == NONE ? NONE : left;
+}
+
+/* Without a joint of this name, the hips are the joint from which the thighs branch, or the root. */
+static void find_hips(const body_side *x)
+{
+    if (has_part(x, VGI_HIPS)) return;
+    uint32_t j = find_between_thighs(x->s, x->roles);
+    if (j != NONE && x->roles[j].part <= VGI_SPINE) x->roles[j] = (vgi_role){.part = VGI_HIPS};
+    if (!has_part(x, VGI_HIPS)) rename_part(x, VGI_ROOT, VGI_HIPS);
+}
+
+/* below[j]: whether joint j is an upper arm or above one. */
+static void find_above_arms(const body_side *x, bool *below)
+{
+    for (size_t j = x->s->njoints; j-- > 0;) {
+        below[j] = below[j] || x->roles[j].part == VGI_UPPER_ARM;
+        if (below[j] && x->s->joints[j].parent != NONE) below[x->s->joints[j].parent] = true;
+    }
+}
+
+/* Rigify: spine joints above the arms are neck and head. */
+static void divide_spine(const body_side *x, bool *below)
+{
+    uint32_t last = NONE;
+    find_above_arms(x, below);
+    if (has_part(x, VGI_NECK) || !below[0]) return;
+    for (uint32_t j = find_from(x, VGI_SPINE, 0); j != NONE; j = find_from(x, VGI_SPINE, j + 1))
+        if (!below[j]) x->roles[j].part = VGI_NECK, last = j;
+    if (last != NONE && !has_part(x, VGI_HEAD)) x->roles[last].part = VGI_HEAD;
 }
 
 int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e)
 {
+    body_side middle = {s, roles, 0};
     bool *below = vgi_array(s->njoints, sizeof *below, e);
-    if (!below) return VG_ENOMEM;
-    for (size_t j = 0; j < s->njoints; j++) roles[j] = look_up(s->joints[j].name);
-    decide_side(roles, s->njoints, 1);
-    decide_side(roles, s->njoints, -1);
-    divide_spine(s, roles, below);
+    double *at = vgi_array(7 * s->njoints, sizeof *at, e);
+    int r = below && at ? vgi_name_roles(s, roles, e) : VG_ENOMEM;
+    if (r == VG_OK) {
+        vg_skeleton_pose(s, NULL, at, at + 3 * s->njoints);
+        for (int side = -1; side <= 1; side += 2) decide_side(&(body_side){s, roles, side}, at);
+        find_hips(&middle);
+        divide_spine(&middle, below);
+    }
     free(below);
-    return VG_OK;
+    free(at);
+    return r;
 }
 
 bool vgi_role_is_limb(vgi_role r)

@@ -27,8 +27,14 @@ typedef enum vgi_part {
     VGI_SHIN,
     VGI_FOOT,
     VGI_TOE,
-    VGI_SHOULDER, /* only while names are read: clavicle or upper arm */
-    VGI_SIDED_HIP /* only while names are read: thigh, or a joint above it */
+    /* only while names are read: */
+    VGI_SHOULDER,  /* clavicle or upper arm */
+    VGI_SIDED_HIP, /* thigh, or a joint above it */
+    VGI_ARM,       /* upper arm, or all of the arm joint by joint */
+    VGI_LEG,       /* shin, thigh above a knee, or all of the leg joint by joint */
+    VGI_WRIST,     /* hand */
+    VGI_PALM,      /* hand, or a joint below it */
+    VGI_ANKLE      /* foot; a foot below it is a toe */
 } vgi_part;
 
 typedef struct vgi_role {
@@ -36,6 +42,8 @@ typedef struct vgi_role {
     int8_t side;  /* 1 left, -1 right, 0 middle */
 } vgi_role;
 
+/* vgi_name_roles: what the names alone tell, also the parts that are open. */
+int vgi_name_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e) VG_MUST_CHECK;
 /* vgi_joint_roles: the roles of all joints (njoints), from their names as Mixamo, CMU, Unreal, MakeHuman, Rigify,
  * Biped, Daz and others write them, and from the hierarchy. */
 int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e) VG_MUST_CHECK;
