@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NAMED = 6 }; /* limbs that a message names */
+enum { NAMED = 8 }; /* limbs that a message names: all of a body */
 
 static size_t find_joint(const vg_skeleton *s, const char *name, size_t length)
 {
@@ -58,7 +58,7 @@ static void read_align(const driving_options *o, const vg_skeleton *s, const cha
 /* "LeftArm (49 degrees), LeftForeArm (60) and 4 more" */
 static void note_aligned(const vg_driver *d, const vg_skeleton *s, const char *map)
 {
-    char list[400] = "";
+    char list[600] = "";
     size_t n = 0, at = 0;
     for (size_t j = 0; j < s->njoints; j++) {
         double degrees = vg_driver_aligned(d, j);
@@ -94,15 +94,44 @@ static void note_stance(const vg_driver *d, const char *map)
         cli_warn("the skeleton of the input rests facing another way than '%s', which is made up for; --align none leaves it", map);
 }
 
+/* "..., also LeftArm, LeftForeArm and 4 more": parts of the body that would be missed. */
+static void note_missing(const vg_driver *d, const vg_rig *rig)
+{
+    const vg_skeleton *s = &rig->skeleton;
+    size_t missing = vg_driver_missing(d), n = 0, at = 0;
+    char list[600] = "";
+    for (size_t j = 0; j < s->njoints; j++) {
+        if (!vg_driver_lacks(d, j) || ++n > NAMED) continue;
+        at += (size_t)snprintf(list + at, sizeof list - at, "%s%.40s", n > 1 ? ", " : "; no joint drives ", s->joints[j].name);
+    }
+    if (n > NAMED) snprintf(list + at, sizeof list - at, " and %zu more", n - NAMED);
+    if (vg_driver_guessed(d))
+        cli_warn("names of joints do not tell arms and legs: they are matched by the shape of the skeletons; --joints pairs them by a file");
+    if (missing)
+        cli_warn("%zu of %zu bones have no matching joint of the skeleton: they follow their parents%s", missing, rig->nbones, list);
+}
+
 /* ---- --joints ---- */
+
+/* The joint with the longest name with which the text begins, followed by a blank or the end: names may contain blanks. */
+static size_t find_first(const vg_skeleton *s, const char *text, size_t *length)
+{
+    size_t best = s->njoints;
+    *length = 0;
+    for (size_t j = 0; j < s->njoints; j++) {
+        size_t n = strlen(s->joints[j].name);
+        if (n > *length && !strncmp(s->joints[j].name, text, n) && strchr(" \t\r\n", text[n])) best = j, *length = n;
+    }
+    return best;
+}
 
 static uint32_t take_joint(lines *l, const vg_skeleton *s, const char *whose)
 {
-    size_t n = strcspn(l->now, " \t\r\n"), j = find_joint(s, l->now, n);
-    if (!n) lines_stop(l, "a bone of the rig and a joint of the skeleton expected");
+    size_t n, word = strcspn(l->now, " \t\r\n"), j = find_first(s, l->now, &n);
+    if (!word) lines_stop(l, "a bone of the rig and a joint of the skeleton expected");
     char advice[120];
     if (j == s->njoints)
-        lines_stop(l, "%s has no joint '%.*s'%s", whose, (int)(n < 80 ? n : 80), l->now, advise(advice, s, l->now, n));
+        lines_stop(l, "%s has no joint '%.*s'%s", whose, (int)(word < 80 ? word : 80), l->now, advise(advice, s, l->now, word));
     l->now += n;
     l->now += strspn(l->now, " \t\r\n");
     return (uint32_t)j;
@@ -134,10 +163,7 @@ void driving_start(driving *d, const driving_options *o, const vg_rig *rig, cons
     read_align(o, &rig->skeleton, name, &how, &chosen);
     how.partner = partner;
     if (vg_driver_new(&d->driver, rig, &d->by, &how, &e) < 0) cli_die(&e);
-    size_t missing = vg_driver_missing(d->driver);
-    if (missing)
-        cli_warn("%zu of %zu bones have no matching joint of the skeleton: they follow their parents",
-                 missing, rig->nbones);
+    note_missing(d->driver, rig);
     d->rig = rig, d->name = name;
     free(chosen);
     free(partner);

@@ -140,6 +140,51 @@ END
     must vg-diff --centred -t 0.04 "$DATA/human-heavy-poses.bvh.xz" out.bvh
 }
 
+# convention STYLE OUT [OPTION...]: the poses of sticks.bvh by another convention, put back onto the skeleton of sticks.bvh
+convention() {
+    local style=$1 out=$2
+    shift 2
+    py "$style" <<END || return 1
+import sys
+sys.path.insert(0, "$ROOT/tests")
+import conventions
+conventions.sticks("sticks.bvh", 12, 7)
+conventions.convert("sticks.bvh", sys.argv[1], "$style.bvh", 1)
+END
+    must vg-deform "$@" --onto sticks.bvh "$style.bvh" -o turns.vgs
+    pipe "vg-solve -q turns.vgs | vg-decode -q -o $out"
+}
+
+@test "poses at random by the joints of many conventions: names, units, axes, rest poses; the same places come back" {
+    for style in mixamo unreal makehuman rigify metarig asf vrm biped motive smpl xsens maya second-life numbered quaternius nameless; do
+        convention $style out.bvh -q
+        must vg-diff -q --centred -t 1e-5 sticks.bvh out.bvh
+    done
+    for style in few kinect roblox; do # no clavicles, whose turns are lost
+        convention $style out.bvh -q
+        must vg-diff -q --centred --of mean -t 0.01 sticks.bvh out.bvh
+    done
+}
+
+@test "names that tell nothing: matched by shape, which is said; a missing limb is named; names with blanks" {
+    convention nameless out.bvh -q
+    must_warn vg-deform --onto sticks.bvh nameless.bvh -o out.vgs
+    says 'they are matched by the shape of the skeletons'
+    convention vrm out.bvh -q
+    sed 's/leftShoulder/d/; s/leftUpperArm/a/; s/leftLowerArm/b/; s/leftHand/c/' vrm.bvh >armless.bvh
+    must_warn vg-deform --onto sticks.bvh armless.bvh -o out.vgs
+    says '4 of 23 bones have no matching joint of the skeleton: they follow their parents; no joint drives LeftArm, LeftForeArm, LeftHand'
+    printf 'LeftArm a\nLeftForeArm b\n' >pairs.txt
+    must_warn vg-deform --joints pairs.txt --onto sticks.bvh armless.bvh -o out.vgs
+    says 'no joint drives Hips, Head, LeftHand, RightArm, RightForeArm, RightHand, LeftUpLeg, LeftLeg and 4 more'
+    convention biped out.bvh -q
+    printf '# bone joint\nLeftArm Bip01 L UpperArm\nLeftForeArm Bip01 L Forearm # moves\nHips Bip01\n' >pairs.txt
+    must vg-deform -q --joints pairs.txt --onto sticks.bvh biped.bvh -o out.vgs
+    printf 'RightForeArm Bip01 L Forearms\n' >pairs.txt
+    must_fail 3 vg-deform --joints pairs.txt --onto sticks.bvh biped.bvh -o no.vgs
+    says 'a bone of the rig and a joint of the skeleton expected'
+}
+
 @test "archives and directories of poses, and several files" {
     mkdir poses
     cp "$DATA"/sit01.bvh.xz "$DATA"/standing03.bvh.xz poses
@@ -164,9 +209,9 @@ END
     must_fail 3 vg-deform --onto walk.bvh cube.obj -o out.vgs
     says 'the target is a skeleton, and the input is none: vg-fitmap --skeleton'
     one_line
-    sed -E 's/(ROOT|JOINT) /\1 x/' walk.bvh >names.bvh
+    awk '/ROOT|JOINT/ {$2 = "b" NR} {print}' walk.bvh >names.bvh
     must_fail 3 vg-deform --onto names.bvh walk.bvh -o out.vgs
-    says '--joints pairs them by a file'
+    says 'its shape does not tell its arms, legs and toes: --joints pairs them by a file'
     nothing_but cube.obj walk.bvh names.bvh
 }
 

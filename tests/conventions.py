@@ -189,7 +189,7 @@ def asf():
     t += [("lowerback", "root", "LowerBack"), ("upperback", "lowerback", "Spine"), ("thorax", "upperback", "Spine1"), ("lowerneck", "thorax", "Neck"), ("upperneck", "lowerneck", "Neck1"), ("head", "upperneck", "Head")]
     for side, s in (("Left", "l"), ("Right", "r")):
         t += [(s + "clavicle", "thorax", side + "Shoulder"), (s + "humerus", s + "clavicle", side + "Arm"), (s + "radius", s + "humerus", side + "ForeArm"),
-              (s + "wrist", s + "radius", ("way", side + "Hand")), (s + "hand", s + "wrist", side + "Hand"), (s + "fingers", s + "hand", ("finger", 1, 1)), (s + "thumb", s + "hand", ("finger", 0, 1))]
+              (s + "wrist", s + "radius", side + "Hand"), (s + "hand", s + "wrist", ("finger", 2, 1)), (s + "fingers", s + "hand", ("finger", 1, 1)), (s + "thumb", s + "wrist", ("finger", 0, 1))]
     return t
 
 
@@ -212,10 +212,88 @@ def humanik():
     return t
 
 
+def body(hips, spine, neck, limb, names, roots=(), clavicle=True):
+    """A table from the names of the chains; limb(side, name) makes the names of the limbs, from clavicle to toes."""
+    t, up = [], None
+    for n in roots: t, up = t + [(n, up, None)], n
+    for n, s in zip(hips, ("Hips", "Hips")): t, up = t + [(n, up, s)], n
+    top = hip = up
+    for n, s in zip(spine, ("LowerBack", "Spine", "Spine1")): t, top = t + [(n, top, s)], n
+    up = top
+    for n, s in zip(neck, ("Neck", "Head")[-len(neck):]): t, up = t + [(n, up, s)], n
+    for side in ("Left", "Right"):
+        arm, leg = ("Shoulder", "Arm", "ForeArm", "Hand"), ("UpLeg", "Leg", "Foot", "ToeBase")
+        for first, parts, words in ((top, arm if clavicle else arm[1:], names[:-4]), (hip, leg, names[-4:])):
+            up = first
+            for part, word in zip(parts, words):
+                if word: t, up = t + [(limb(side, word), up, side + part)], limb(side, word)
+    return t
+
+
+def prefixed(prefix, table):
+    return [(prefix + n, p and prefix + p, s) for n, p, s in table]
+
+
+def biped():
+    """The pelvis below a root of the same place; clavicles hang from the neck, thighs from the spine."""
+    t = body(["", " Pelvis"], [" Spine", " Spine1", " Spine2"], [" Neck", " Head"], lambda side, n: " %s %s" % (side[0], n), ["Clavicle", "UpperArm", "Forearm", "Hand", "Thigh", "Calf", "Foot", "Toe0"])
+    other = {" L Clavicle": " Neck", " R Clavicle": " Neck", " L Thigh": " Spine", " R Thigh": " Spine"}
+    return [("Bip01" + n, None if p is None else "Bip01" + other.get(n, p), s) for n, p, s in t]
+
+
+def motive():
+    return prefixed("Skeleton 001:", body(["Hip"], ["Ab", "Chest"], ["Neck", "Head"], lambda side, n: side[0] + n, ["Shoulder", "UArm", "FArm", "Hand", "Thigh", "Shin", "Foot", "Toe"]))
+
+
+def kinect():
+    t = body(["HipCenter"], ["Spine"], ["ShoulderCenter", "Head"], lambda side, n: n + side, ["Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle", "Foot"], clavicle=False)
+    return t + [("Hand" + side, "Wrist" + side, ("finger", 1, 1)) for side in ("Left", "Right")]
+
+
+def smpl():
+    t = body(["Pelvis"], ["Spine1", "Spine2", "Spine3"], ["Neck", "Head"], lambda side, n: "%s_%s" % (side[0], n), ["Collar", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle", "Foot"])
+    return prefixed("m_avg_", t + [(s + "_Hand", s + "_Wrist", ("finger", 1, 1)) for s in "LR"])
+
+
+def xsens():
+    return body(["Pelvis"], ["L5", "L3", "T8"], ["Neck", "Head"], lambda side, n: side + n, ["Shoulder", "UpperArm", "ForeArm", "Hand", "UpperLeg", "LowerLeg", "Foot", "Toe"])
+
+
+def maya():
+    t = body(["Root_M"], ["Spine1_M", "Spine2_M", "Chest_M"], ["Neck_M", "Head_M"], lambda side, n: "%s_%s" % (n, side[0]), ["Scapula", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle", "Toes"])
+    return [(n + "_jnt", p and p + "_jnt", s) for n, p, s in t]
+
+
+def second_life():
+    return prefixed("m", body(["Pelvis"], ["Torso", "Chest"], ["Neck", "Head"], lambda side, n: n + side, ["Collar", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle", "Foot"]))
+
+
+def roblox():
+    return body(["LowerTorso"], ["UpperTorso"], ["Head"], lambda side, n: side + n, ["UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot", None], ["HumanoidRootPart"], clavicle=False)
+
+
+def numbered():
+    """Limbs by numbers alone."""
+    return body(["hips"], ["spine"], ["neck", "head"], lambda side, n: "%s_%s" % (n, side[0].lower()), ["shoulder", "arm_1", "arm_2", "arm_3", "leg_1", "leg_2", "leg_3", "leg_4"])
+
+
+def quaternius():
+    """The end of the arm is no word for a hand."""
+    return body(["Body", "Hips"], ["Abdomen", "Torso"], ["Neck", "Head"], lambda side, n: "%s.%s" % (n, side[0]), ["Shoulder", "UpperArm", "LowerArm", "Grip", "UpperLeg", "LowerLeg", "Foot", None], ["Bone"])
+
+
+def nameless():
+    t = prefixed("", humanik())
+    number = {n: "joint%d" % i for i, (n, _, _) in enumerate(t)}
+    return [(number[n], p and number[p], s) for n, p, s in t]
+
+
 # table, arms of the rest pose in degrees below horizontal, scale, whether z is up
 STYLES = {"mixamo": (mixamo, 0, 1.0, False), "unreal": (unreal, 50, 1.0, True), "makehuman": (makehuman, 40, 0.1, False), "rigify": (rigify, 45, 0.01, True),
           "metarig": (metarig, 30, 0.01, False), "asf": (asf, 0, 1 / 0.45, False), "few": (few, 0, 1.0, False), "vrm": (humanik, 0, 0.01, False),
-          "unreal-y": (unreal, 50, 1.0, False), "rigify-y": (rigify, 45, 0.01, False)}
+          "unreal-y": (unreal, 50, 1.0, False), "rigify-y": (rigify, 45, 0.01, False), "biped": (biped, 0, 1.0, False), "motive": (motive, 0, 100, False),
+          "kinect": (kinect, 10, 0.01, False), "smpl": (smpl, 0, 0.01, False), "xsens": (xsens, 88, 1.0, False), "maya": (maya, 45, 1.0, False), "roblox": (roblox, 85, 2.54, False),
+          "second-life": (second_life, 0, 0.01, False), "numbered": (numbered, 30, 1.0, False), "quaternius": (quaternius, -10, 1.0, False), "nameless": (nameless, 20, 1.0, False)}
 LIMBS = {s + n: s + c for s in ("Left", "Right") for n, c in (("Arm", "ForeArm"), ("ForeArm", "Hand"), ("UpLeg", "Leg"), ("Leg", "Foot"))}
 
 
@@ -308,6 +386,33 @@ def write(path, joints, source, b, rows, step, scale, up, world):
             line += ["%.6f" % x for x in angles(local)]
         out.append(" ".join(line))
     open(path, "w").write("\n".join(out) + "\n")
+
+
+# a figure of sticks with CMU's names, in metres: joint, parent, OFFSET
+STICKS = [("Hips", None, (0, 0, 0)), ("LowerBack", "Hips", (0, 0.1, 0)), ("Spine", "LowerBack", (0, 0.12, 0)), ("Spine1", "Spine", (0, 0.12, 0)), ("Neck", "Spine1", (0, 0.15, 0)),
+          ("Neck1", "Neck", (0, 0.05, 0)), ("Head", "Neck1", (0, 0.05, 0))]
+for _side, _x in (("Left", 1), ("Right", -1)):
+    STICKS += [(_side + n, _side + p if p in ("Shoulder", "Arm", "ForeArm", "UpLeg", "Leg", "Foot") else p, (_x * a, b, c)) for n, p, (a, b, c) in (
+        ("Shoulder", "Spine1", (0.03, 0.1, 0)), ("Arm", "Shoulder", (0.15, 0, 0)), ("ForeArm", "Arm", (0.28, 0, 0)), ("Hand", "ForeArm", (0.25, 0, 0)),
+        ("UpLeg", "Hips", (0.1, -0.05, 0)), ("Leg", "UpLeg", (0, -0.42, 0)), ("Foot", "Leg", (0, -0.4, 0)), ("ToeBase", "Foot", (0, -0.06, 0.14)))]
+MOVES = {"LowerBack": 30, "Neck": 25, "Head": 20, "Shoulder": 10, "Arm": 70, "ForeArm": 60, "Hand": 30, "UpLeg": 50, "Leg": 40, "Foot": 20}
+
+
+def sticks(path, frames, seed):
+    """Poses at random of joints that every skeleton has: of a spine, the lowest joint turns."""
+    import random
+    r, out, joints = random.Random(seed), [], {}
+    for n, p, x in STICKS:
+        joints[n] = Joint(n, joints.get(p), x)
+        joints[n].source, joints[n].channels = joints[n], ["Xposition", "Yposition", "Zposition"][:0 if p else 3] + ["Zrotation", "Xrotation", "Yrotation"]
+    for _ in range(frames):
+        row = [r.uniform(-1, 1), 1 + r.uniform(0, 0.2), r.uniform(-1, 1)]
+        for n, _, _ in STICKS:
+            most = MOVES.get(re.sub("^(Left|Right)", "", n), 10 if n == "Hips" else 0)
+            row += [r.uniform(-most, most) for _ in range(3)]
+        out.append(row)
+    order = list(joints.values())
+    write(path, order, order, {j: IDENTITY for j in order}, out, 1 / 30, 1.0, IDENTITY, IDENTITY)
 
 
 if __name__ == "__main__":

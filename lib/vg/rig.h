@@ -12,7 +12,8 @@ extern "C" {
 
 /* vg_skeleton_pair: for each joint of a skeleton (njoints of `of`) the corresponding joint of another one,
  * UINT32_MAX: none. Joints correspond by name, whatever their order and number; then by the body part that their
- * names mean by the conventions of Mixamo, CMU, Unreal, MakeHuman, Rigify and others. */
+ * names mean by the conventions of Mixamo, CMU, Unreal, MakeHuman, Rigify and others, or by shape if no name is that of an arm
+ * or leg. */
 int vg_skeleton_pair(const vg_skeleton *of, const vg_skeleton *by, uint32_t *partner, vg_err *e) VG_MUST_CHECK;
 
 /* A rig driven by its own skeleton or another one. Joints of the rig that the other skeleton lacks follow their
@@ -20,7 +21,7 @@ int vg_skeleton_pair(const vg_skeleton *of, const vg_skeleton *by, uint32_t *par
  * all bones that both have. */
 typedef struct vg_driver vg_driver;
 typedef enum vg_align {
-    VG_ALIGN_AUTO = 0, /* if a limb differs by more than 20 degrees at rest: all limbs that differ by more than 3 */
+    VG_ALIGN_AUTO = 0, /* if a limb differs by more than 8 degrees at rest: all limbs that differ by more than 3 */
     VG_ALIGN_NONE,     /* no alignment: both rest poses and their axes as they are */
     VG_ALIGN_ALL,      /* all joints that have children */
     VG_ALIGN_CHOSEN    /* those of `chosen` */
@@ -36,6 +37,11 @@ int vg_driver_new(vg_driver **d, const vg_rig *r, const vg_skeleton *by, const v
                   vg_err *e) VG_MUST_CHECK;
 void vg_driver_free(vg_driver **d);
 size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow their parents */
+/* vg_driver_lacks: whether a joint of the rig is a limb, hand, foot, head or the hips, and no joint drives this part of the
+ * body. */
+bool vg_driver_lacks(const vg_driver *d, size_t joint);
+/* vg_driver_guessed: whether the joints of one skeleton have no names of limbs, and were found by its shape. */
+bool vg_driver_guessed(const vg_driver *d);
 /* vg_driver_aligned: the angle in degrees by which a joint of the rig was aligned with the other skeleton; 0: it
  * was not. */
 double vg_driver_aligned(const vg_driver *d, size_t joint);

@@ -1,8 +1,9 @@
 /* align.c: aligns the rest poses of two skeletons by the directions of their bones.
  *
- * By default limbs are aligned when any of them differs by more than APART degrees; then all limbs that differ by
- * more than ALIKE degrees are aligned. The spine, clavicles, feet and fingers are left alone: skeletons differ more
- * in where they place these joints than in their rest poses.
+ * By default limbs are aligned when any of them differs by more than APART degrees; then all limbs that differ by more
+ * than ALIKE degrees are aligned. Arms that differ by 15 degrees make a body miss by 3 % of its size. The spine,
+ * clavicles, feet and fingers are left alone: skeletons differ more in where they place these joints than in their rest
+ * poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
 #include "numeric/polar.h"
@@ -13,6 +14,7 @@
 
 static const uint32_t NONE = UINT32_MAX;
 static const double APART = 8, ALIKE = 3;
+static const double STRANGERS = 20; /* APART for bones of unknown role, such as breasts and tails: bodies differ in them */
 static const double LONG = 0.1; /* a bone of unknown role counts as a limb if it is at least this long, relative to
                                  * the skeleton's diagonal */
 
@@ -25,8 +27,8 @@ int vgi_rests_new(vgi_rests *x, const vg_skeleton *of, const vg_skeleton *by, co
     if (!x->roles || !x->their_roles || !x->rest || !x->theirs) return VG_ENOMEM;
     vg_skeleton_pose(of, NULL, x->rest, x->rest + 3 * n);
     vg_skeleton_pose(by, NULL, x->theirs, x->theirs + 3 * m);
-    int r = vgi_joint_roles(of, x->roles, e);
-    return r < 0 ? r : vgi_joint_roles(by, x->their_roles, e);
+    int r = vgi_joint_roles(of, x->roles, &x->guessed[0], e);
+    return r < 0 ? r : vgi_joint_roles(by, x->their_roles, &x->guessed[1], e);
 }
 
 void vgi_rests_clear(vgi_rests *x)
@@ -150,9 +152,11 @@ static double limb_apart(const vgi_rests *x, size_t j, double shortest)
 
 static void choose_limbs(const vgi_rests *x, bool *wanted)
 {
-    double most = 0, shortest = LONG * vg_diagonal(x->rest, x->of->njoints);
-    for (size_t j = 0; j < x->of->njoints; j++) most = fmax(most, limb_apart(x, j, shortest));
-    for (size_t j = 0; j < x->of->njoints && most > APART; j++) wanted[j] = limb_apart(x, j, shortest) > ALIKE;
+    double shortest = LONG * vg_diagonal(x->rest, x->of->njoints);
+    bool apart = false;
+    for (size_t j = 0; j < x->of->njoints; j++)
+        if (limb_apart(x, j, shortest) > (vgi_role_is_limb(x->roles[j]) ? APART : STRANGERS)) apart = true;
+    for (size_t j = 0; j < x->of->njoints && apart; j++) wanted[j] = limb_apart(x, j, shortest) > ALIKE;
 }
 
 /* Change q, the rotation of the joint above, so that the directions of both skeletons agree. */

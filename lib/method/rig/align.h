@@ -9,6 +9,7 @@ typedef struct vgi_rests {
     const vg_skeleton *of, *by; /* both borrowed, as is `from` */
     const uint32_t *from;       /* per joint of `of`: the matching joint of `by`, or UINT32_MAX */
     vgi_role *roles, *their_roles;
+    bool guessed[2];       /* whether roles of `of` and of `by` come from the shape */
     double *rest, *theirs; /* joint positions without rotations, 3 numbers each */
 } vgi_rests;
 

@@ -21,6 +21,8 @@ struct vg_driver {
     vgi_stance stance;
     double scale;
     size_t missing;
+    bool *lacks;     /* per joint of the rig: no joint of the skeleton drives this part of the body */
+    bool guessed;
     double *positions, *turns; /* of the joints of the rig */
 };
 
@@ -42,12 +44,29 @@ static double compare_sizes(const vg_driver *d, const vgi_rests *x)
     return sum[0] > 0 && sum[1] > 0 ? sum[0] / sum[1] : 1;
 }
 
+/* Parts of the body whose motion is missed, unlike that of fingers and of more joints in the spine. */
+static bool is_main_part(vgi_role r)
+{
+    return vgi_role_is_limb(r) || r.part == VGI_HIPS || r.part == VGI_HEAD || r.part == VGI_HAND || r.part == VGI_FOOT;
+}
+
+static void find_lacks(vg_driver *d, const vgi_role *roles)
+{
+    for (size_t j = 0; j < d->r->skeleton.njoints; j++) {
+        d->lacks[j] = d->from[j] == NONE && d->r->skeleton.joints[j].nchannels && is_main_part(roles[j]);
+        for (size_t k = 0; d->lacks[j] && k < d->r->skeleton.njoints; k++)
+            if (d->from[k] != NONE && roles[k].part == roles[j].part && roles[k].side == roles[j].side) d->lacks[j] = false;
+    }
+}
+
 static int compare_rests(vg_driver *d, const vg_driver_options *o, vg_err *e)
 {
     vgi_rests x = {0};
     int r = vgi_rests_new(&x, &d->r->skeleton, d->by, d->from, e);
     if (r == VG_OK) {
         d->scale = compare_sizes(d, &x);
+        find_lacks(d, x.roles);
+        d->guessed = !o->partner && (x.guessed[0] || x.guessed[1]);
         d->stance = (vgi_stance){.world = {1, 0, 0, 0}, .rest = {1, 0, 0, 0}};
         if (o->align != VG_ALIGN_NONE) vgi_rests_stand(&x, d->r->at, &d->stance);
         r = vgi_align(&x, o->align, o->chosen, d->before, d->degrees, e);
@@ -86,8 +105,8 @@ static int pair_joints(vg_driver *d, const uint32_t *partner, vg_err *e)
     find_leads(d);
     if (found) return VG_OK;
     return vg_fail(e, VG_EINPUT,
-                   "no joint of the skeleton has the name of a bone of the rig, such as '%.80s', nor a usual name "
-                   "for the same part of the body: --joints pairs them by a file",
+                   "no joint of the skeleton has the name of a bone of the rig, such as '%.80s', or a usual name for the same part "
+                   "of the body, and its shape does not tell its arms, legs and toes: --joints pairs them by a file",
                    s->joints[d->r->bone[0]].name);
 }
 
@@ -99,9 +118,10 @@ int vg_driver_new(vg_driver **out, const vg_rig *g, const vg_skeleton *by, const
     d->r = g, d->by = by;
     d->from = vgi_array(n, sizeof *d->from, e), d->before = vgi_array(4 * n, sizeof *d->before, e);
     d->carried = vgi_array(n, sizeof *d->carried, e), d->lead = vgi_array(n, sizeof *d->lead, e);
+    d->lacks = vgi_array(n, sizeof *d->lacks, e);
     d->degrees = vgi_array(n, sizeof *d->degrees, e), d->positions = vgi_array(3 * n, sizeof *d->positions, e);
     d->turns = vgi_array(4 * n, sizeof *d->turns, e);
-    bool all = d->from && d->before && d->carried && d->lead && d->degrees && d->positions && d->turns;
+    bool all = d->from && d->before && d->carried && d->lead && d->lacks && d->degrees && d->positions && d->turns;
     int r = all ? pair_joints(d, o->partner, e) : VG_ENOMEM;
     if (r == VG_OK) r = compare_rests(d, o, e);
     if (r < 0) vg_driver_free(out);
@@ -115,6 +135,7 @@ void vg_driver_free(vg_driver **out)
     free(d->from);
     free(d->carried);
     free(d->lead);
+    free(d->lacks);
     free(d->before);
     free(d->degrees);
     free(d->positions);
@@ -126,6 +147,16 @@ void vg_driver_free(vg_driver **out)
 size_t vg_driver_missing(const vg_driver *d)
 {
     return d->missing;
+}
+
+bool vg_driver_lacks(const vg_driver *d, size_t joint)
+{
+    return d->lacks[joint];
+}
+
+bool vg_driver_guessed(const vg_driver *d)
+{
+    return d->guessed;
 }
 
 double vg_driver_aligned(const vg_driver *d, size_t joint)

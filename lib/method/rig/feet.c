@@ -104,7 +104,7 @@ static double height(const feet *f, const double point[3])
 static int prepare_feet(feet *f, vg_err *e)
 {
     vgi_role *roles = vgi_array(f->r->skeleton.njoints, sizeof *roles, e);
-    int r = roles ? vgi_joint_roles(&f->r->skeleton, roles, e) : VG_ENOMEM;
+    int r = roles ? vgi_joint_roles(&f->r->skeleton, roles, NULL, e) : VG_ENOMEM;
     for (int side = -1; r == VG_OK && side <= 1; side += 2) {
         leg *l = &f->legs[f->nlegs];
         if (!find_leg(f->r, roles, side, l)) continue;

@@ -154,7 +154,14 @@ static void divide_spine(const body_side *x, bool *below)
     if (last != NONE && !has_part(x, VGI_HEAD)) x->roles[last].part = VGI_HEAD;
 }
 
-int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e)
+static bool have_limbs(const vg_skeleton *s, const vgi_role *roles)
+{
+    for (size_t j = 0; j < s->njoints; j++)
+        if (vgi_role_is_limb(roles[j])) return true;
+    return false;
+}
+
+int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, bool *guessed, vg_err *e)
 {
     body_side middle = {s, roles, 0};
     bool *below = vgi_array(s->njoints, sizeof *below, e);
@@ -163,6 +170,9 @@ int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e)
     if (r == VG_OK) {
         vg_skeleton_pose(s, NULL, at, at + 3 * s->njoints);
         for (int side = -1; side <= 1; side += 2) decide_side(&(body_side){s, roles, side}, at);
+        bool named = have_limbs(s, roles);
+        if (!named) r = vgi_guess_roles(s, at, roles, e);
+        if (guessed) *guessed = !named && have_limbs(s, roles);
         find_hips(&middle);
         divide_spine(&middle, below);
     }

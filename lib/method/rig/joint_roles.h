@@ -44,9 +44,12 @@ typedef struct vgi_role {
 
 /* vgi_name_roles: what the names alone tell, also the parts that are open. */
 int vgi_name_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e) VG_MUST_CHECK;
+/* vgi_guess_roles: roles from the positions of the joints at rest. If the shape is not that of a body, roles stay as they are. */
+int vgi_guess_roles(const vg_skeleton *s, const double *at, vgi_role *roles, vg_err *e) VG_MUST_CHECK;
 /* vgi_joint_roles: the roles of all joints (njoints), from their names as Mixamo, CMU, Unreal, MakeHuman, Rigify,
- * Biped, Daz and others write them, and from the hierarchy. */
-int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e) VG_MUST_CHECK;
+ * Biped, Daz and others write them, and from the hierarchy; from the shape of the skeleton if no name is that of a
+ * limb; guessed (or NULL): whether that has found limbs. */
+int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, bool *guessed, vg_err *e) VG_MUST_CHECK;
 /* vgi_role_is_limb: whether it is upper arm, forearm, thigh or shin. */
 bool vgi_role_is_limb(vgi_role r);
 

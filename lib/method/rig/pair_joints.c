@@ -69,8 +69,8 @@ static bool share_names(const vg_skeleton *of, const vg_skeleton *by)
 int vg_skeleton_pair(const vg_skeleton *of, const vg_skeleton *by, uint32_t *partner, vg_err *e)
 {
     vgi_role *a = vgi_array(of->njoints, sizeof *a, e), *b = vgi_array(by->njoints, sizeof *b, e);
-    int r = a && b ? vgi_joint_roles(of, a, e) : VG_ENOMEM;
-    if (r == VG_OK) r = vgi_joint_roles(by, b, e);
+    int r = a && b ? vgi_joint_roles(of, a, NULL, e) : VG_ENOMEM;
+    if (r == VG_OK) r = vgi_joint_roles(by, b, NULL, e);
     if (r == VG_OK) {
         for (size_t j = 0; j < of->njoints; j++) partner[j] = NONE;
         bool names_first = share_names(of, by);
