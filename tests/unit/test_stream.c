@@ -674,83 +674,112 @@ static void test_end_mark(void)
 
 /* ---- which record where ---- */
 
+static bool is_unknown(const char *tag)
+{
+    return !strcmp(tag, "NOTE") || !strcmp(tag, "X 12") || !strcmp(tag, "MID ") || !strcmp(tag, "LAST");
+}
+
+static bool may_repeat(const char *tag)
+{
+    return is_unknown(tag) || !strcmp(tag, "PROV") || !strcmp(tag, "FRAM");
+}
+
+/* Whether the records in this order are a valid stream. what: what is wrong otherwise. */
+static void expect(const parts *p, const int *order, bool valid, const char *what)
+{
+    vg_bytes x = put_together(p, order);
+    vg_err e = {0, ""};
+    if (valid) CHECK(read_memory(x.data, x.size, NULL, &e) == 0);
+    else refuse(x.data, x.size, VG_EINPUT, what);
+    vg_bytes_clear(&x);
+}
+
+static void repeat_record(const parts *p, int n, int i)
+{
+    char what[80];
+    int order[MOST + 2], k = 0;
+    for (int j = 0; j < n; j++) {
+        order[k++] = j;
+        if (j == i) order[k++] = j;
+    }
+    order[k] = -1;
+    snprintf(what, sizeof what, "two %s records", p->at[i].tag);
+    expect(p, order, may_repeat(p->at[i].tag), what);
+}
+
+/* SELE and LINK change how many corners there are, ANCH the size of a frame; SKIN needs RIG. */
+static void leave_out_record(const parts *p, int n, int i)
+{
+    const char *tag = p->at[i].tag;
+    char what[80];
+    int order[MOST + 2], k = 0;
+    bool may_miss = may_repeat(tag) || !strcmp(tag, "TEXC") || !strcmp(tag, "LABL") || !strcmp(tag, "SKEL") ||
+                    !strcmp(tag, "CORR") || !strcmp(tag, "SKIN");
+    if (!strcmp(tag, "PROV")) may_miss = i != 0; /* the second names the first as its parent */
+    for (int j = 0; j < n; j++)
+        if (j != i) order[k++] = j;
+    order[k] = -1;
+    snprintf(what, sizeof what, "no %s record", tag);
+    expect(p, order, may_miss, what);
+}
+
+/* Before MESH, and after FORM. */
+static void move_record(const parts *p, int n, int i)
+{
+    const char *tag = p->at[i].tag;
+    const int form = find(p, "FORM"), mesh = find(p, "MESH");
+    const bool needs_mesh = strstr("TEXC LABL SELE LINK ANCH REFP SKEL RIG  SKIN FORM FRAM", tag) && !is_unknown(tag);
+    for (int place = 0; place < 2 && i != mesh; place++) {
+        char what[80];
+        int order[MOST + 2], k = 0;
+        for (int j = 0; j < n; j++) {
+            if (place == 0 && j == mesh) order[k++] = i;
+            if (j != i) order[k++] = j;
+            if (place == 1 && j == form && i != form) order[k++] = i;
+        }
+        order[k] = -1;
+        bool refused = place == 0 ? needs_mesh : !may_repeat(tag) || !strcmp(tag, "PROV");
+        if (i == form && place == 1) refused = true; /* then it is missing */
+        if (i == 0 && place == 0) refused = true;    /* a PROV behind the one that names it as its parent */
+        snprintf(what, sizeof what, "%s %s", tag, place ? "behind FORM" : "before MESH");
+        expect(p, order, !refused, what);
+    }
+}
+
+/* Any order that keeps MESH first, and RIG before SKIN, is the same stream. */
+static void other_order(const parts *p, int n, const content *c)
+{
+    const int form = find(p, "FORM"), mesh = find(p, "MESH"), rig = find(p, "RIG ");
+    int order[MOST + 2], k = 0;
+    content back = {0};
+    vg_err e = {0, ""};
+    order[k++] = mesh;
+    order[k++] = rig;
+    for (int j = form - 1; j >= 0; j--)
+        if (j != mesh && j != rig && strcmp(p->at[j].tag, "PROV") && !(p->at[j].flags & COPY_SAFE)) order[k++] = j;
+    for (int j = 0; j < n; j++)
+        if (j >= form || (j != mesh && j != rig && (!strcmp(p->at[j].tag, "PROV") || (p->at[j].flags & COPY_SAFE)))) order[k++] = j;
+    order[k] = -1;
+    CHECK(k == n);
+    vg_bytes x = put_together(p, order);
+    CHECK(read_memory(x.data, x.size, &back, &e) == 0);
+    CHECK(same_content(c, &back));
+    content_clear(&back);
+    vg_bytes_clear(&x);
+}
+
 static void test_order(void)
 {
     content c = make(VG_VECTORS, VG_F64, FULL);
     vg_bytes b = written(&c);
     parts p = take_apart(&b);
-    int n = (int)p.n - 1, order[MOST + 2], form = find(&p, "FORM"), mesh = find(&p, "MESH");
-    int rig = find(&p, "RIG ");
-    char what[80];
+    const int n = (int)p.n - 1;
     for (int i = 0; i < n; i++) {
-        char tag[5];
-        memcpy(tag, p.at[i].tag, 5);
-        bool unknown_tag =
-            !strcmp(tag, "NOTE") || !strcmp(tag, "X 12") || !strcmp(tag, "MID ") || !strcmp(tag, "LAST");
-        bool again = unknown_tag || !strcmp(tag, "PROV") || !strcmp(tag, "FRAM");
-        /* twice in a row */
-        int k = 0;
-        for (int j = 0; j < n; j++) {
-            order[k++] = j;
-            if (j == i) order[k++] = j;
-        }
-        order[k] = -1;
-        vg_bytes x = put_together(&p, order);
-        vg_err e = {0, ""};
-        snprintf(what, sizeof what, "two %s records", tag);
-        if (again) CHECK(read_memory(x.data, x.size, NULL, &e) == 0);
-        else refuse(x.data, x.size, VG_EINPUT, what);
-        vg_bytes_clear(&x);
-        /* left out: SELE and LINK change how many corners there are, ANCH the size of a frame */
-        bool may_miss = again || !strcmp(tag, "TEXC") || !strcmp(tag, "LABL") || !strcmp(tag, "SKEL") ||
-                        !strcmp(tag, "CORR") || !strcmp(tag, "SKIN"); /* RIG: SKIN needs it */
-        if (!strcmp(tag, "PROV")) may_miss = i != 0; /* the second names the first as its parent */
-        k = 0;
-        for (int j = 0; j < n; j++)
-            if (j != i) order[k++] = j;
-        order[k] = -1;
-        x = put_together(&p, order);
-        snprintf(what, sizeof what, "no %s record", tag);
-        if (may_miss) CHECK(read_memory(x.data, x.size, NULL, &e) == 0);
-        else refuse(x.data, x.size, VG_EINPUT, what);
-        vg_bytes_clear(&x);
-        /* before MESH, and behind FORM */
-        bool needs_mesh = strstr("TEXC LABL SELE LINK ANCH REFP SKEL RIG  SKIN FORM FRAM", tag) && !unknown_tag;
-        for (int place = 0; place < 2 && i != mesh; place++) {
-            k = 0;
-            for (int j = 0; j < n; j++) {
-                if (place == 0 && j == mesh) order[k++] = i;
-                if (j != i) order[k++] = j;
-                if (place == 1 && j == form && i != form) order[k++] = i;
-            }
-            order[k] = -1;
-            x = put_together(&p, order);
-            bool refused = place == 0 ? needs_mesh : !again || !strcmp(tag, "PROV");
-            if (i == form && place == 1) refused = true; /* then it is missing */
-            if (i == 0 && place == 0) refused = true;    /* a PROV behind the one that names it as its parent */
-            snprintf(what, sizeof what, "%s %s", tag, place ? "behind FORM" : "before MESH");
-            if (refused) refuse(x.data, x.size, VG_EINPUT, what);
-            else CHECK(read_memory(x.data, x.size, NULL, &e) == 0);
-            vg_bytes_clear(&x);
-        }
+        repeat_record(&p, n, i);
+        leave_out_record(&p, n, i);
+        move_record(&p, n, i);
     }
-    /* any order that keeps MESH first, and RIG before SKIN, is the same stream */
-    content back = {0};
-    vg_err e = {0, ""};
-    int k = 0;
-    order[k++] = mesh;
-    order[k++] = rig;
-    for (int j = form - 1; j >= 0; j--)
-        if (j != mesh && j != rig && strcmp(p.at[j].tag, "PROV") && !(p.at[j].flags & COPY_SAFE)) order[k++] = j;
-    for (int j = 0; j < n; j++)
-        if (j >= form || (j != mesh && j != rig && (!strcmp(p.at[j].tag, "PROV") || (p.at[j].flags & COPY_SAFE)))) order[k++] = j;
-    order[k] = -1;
-    CHECK(k == n);
-    vg_bytes x = put_together(&p, order);
-    CHECK(read_memory(x.data, x.size, &back, &e) == 0);
-    CHECK(same_content(&c, &back));
-    content_clear(&back);
-    vg_bytes_clear(&x);
+    other_order(&p, n, &c);
     drop(&p);
     vg_bytes_clear(&b);
     content_clear(&c);

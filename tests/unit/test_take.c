@@ -5,7 +5,6 @@
 #include "test.h"
 
 #include "io/smoothing.h"
-#include "io/polygon.h"
 #include "numeric/face.h"
 
 static int read_bytes(vg_model *m, const void *data, size_t n, const char *name, char message[480])
