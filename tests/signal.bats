@@ -320,7 +320,7 @@ END
 }
 
 @test "every line of an edit that says nothing is named" {
-    for line in 'control 5' 'control 99 1 1' 'control 0 1 1' 'control 1.5 1 1' 'control 1 1 1 1' 'control 1 nan 1' 'control 1 1e999 1' \
+    for line in 'control 5' 'control 99 1 1' 'control 0 1 1' 'control 1.5 1 1' 'control 1 1 1 1' 'control 1 nan 1' 'control 1 1e999 1' 'control 0x1 1 1' \
         'move 1 1 1' 'insert 1' 'insert 34' 'insert' 'remove 1' 'remove 2' 'remove 10' 'frame 99 1 1' 'frame 1 x 1' 'site 0' 'site 99' \
         'time 0 1' 'time 1' $'control 1 1\x01 1'; do
         printf '# a comment\n%s\n' "$line" >edits.txt

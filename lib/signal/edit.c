@@ -177,7 +177,8 @@ static int apply_line(editing *x, const char *line, vg_err *e)
         char *end;
         if (!next_word(&line, &word)) return vg_fail(e, VG_EINPUT, "%s: %s expected", x->where, v->usage);
         number[i] = strtod(word, &end);
-        if (end != line || !isfinite(number[i]) || fabs(number[i]) > 1e100)
+        bool decimal = strspn(word, "+-.0123456789eE") >= (size_t)(line - word); /* strtod takes hexadecimal ones too */
+        if (end != line || !decimal || !isfinite(number[i]) || fabs(number[i]) > 1e100)
             return vg_fail(e, VG_EINPUT, "%s: '%.*s' is not valid here: %s expected", x->where,
                            (int)(line - word < 40 ? line - word : 40), word, v->usage);
     }
