@@ -44,7 +44,7 @@ void raw_write(FILE *f, const vg_frame *from, size_t count, size_t width)
         for (size_t k = 0; k < n; k++) {
             double x = from->values[i + k];
             if (width == 4 && !isfinite((float)x))
-                cli_stop(VG_EINPUT, "frame '%s': number %zu does not fit single precision (%g): use ':f64'", from->name, i + k, x);
+                cli_stop(VG_EINPUT, "frame '%s': number %zu does not fit binary32 (%g): use ':f64'", from->name, i + k, x);
             store_number(block + k * width, x, width);
         }
         fwrite(block, width, n, f); /* cli_text_end sees what was lost */

@@ -267,7 +267,7 @@ END
     must grep -Eo '^ +[0-9.]+ *:' late.usda
     [ "$(tr -d ' \n' <<<"$output")" = "1:2:3:1:2:3:" ]
     must_fail 2 vg-decode --f64 -o wide.usda walk.vgs
-    says "cannot write 'wide.usda' in full precision"
+    says "cannot write 'wide.usda' as binary64"
     must_fail 3 vg-encode walk.usda -o out.vgs
 }
 

@@ -83,7 +83,7 @@ END
         same_file $file piped
     done
     must_fail 2 vg-decode --f64 -o wide.glb horse.vgs
-    says "cannot write 'wide.glb' in full precision"
+    says "cannot write 'wide.glb' as binary64"
 }
 
 @test "a long sequence has fewer morph targets, and the error that is said is the one there is" {

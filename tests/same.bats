@@ -101,7 +101,7 @@ alike() {
     sed 's/^v /v 1e39 /; s/^\(v [^ ]* [^ ]* [^ ]*\).*/\1/' a.obj >d.obj
     must vg-encode --no-provenance [a-d].obj -o large.vgs
     alike 3 vg-decode large.vgs -o 'out-%d.obj'
-    says "cannot write frame 'd'" single
+    says "cannot write frame 'd'" binary32
     [ "$(echo out-*)" = 'out-*' ]
 }
 

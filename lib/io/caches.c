@@ -270,7 +270,7 @@ static int keep_time(writing *x, const vg_frame *f, vg_err *e)
 {
     unsigned char time[4];
     double t = f->has_time ? f->time : (double)x->samples / VG_FPS;
-    if (!isfinite((float)t)) return vg_fail(e, VG_EINPUT, "its time %g does not fit single precision", t);
+    if (!isfinite((float)t)) return vg_fail(e, VG_EINPUT, "its time %g does not fit binary32", t);
     store_float(time, (float)t, true);
     return vgi_bytes_append(&x->times, time, sizeof time, e);
 }
@@ -285,7 +285,7 @@ static int put_sample(void *state, const vg_frame *f, vg_err *e)
     for (size_t i = 0; i < 3 * x->points; i++, p += 4) {
         float v = (float)f->values[i];
         if (!isfinite(v))
-            return vg_fail(e, VG_EINPUT, "vertex %zu does not fit single precision (%g)", i / 3, f->values[i]);
+            return vg_fail(e, VG_EINPUT, "vertex %zu does not fit binary32 (%g)", i / 3, f->values[i]);
         store_float(p, v, x->big);
     }
     note_time(x, f);
@@ -305,7 +305,7 @@ static int end_pc2(void *state, vg_err *e)
         if (x->samples > 1) rate = (float)((x->last - x->first) / (x->samples - 1));
     }
     if (!isfinite(start) || !isfinite(rate))
-        return vg_fail(e, VG_EINPUT, "the times of the frames do not fit single precision");
+        return vg_fail(e, VG_EINPUT, "the times of the frames do not fit binary32");
     store_float(tail, start, false);
     store_float(tail + 4, rate, false);
     vgi_put32(tail + 8, x->samples);

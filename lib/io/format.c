@@ -88,14 +88,14 @@ int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, c
     return vgi_model_read(m, data, n, known, name, subject, e);
 }
 
-/* Check whether n numbers are finite in the given precision. */
-static int check_range(const double *x, size_t n, size_t per_item, const char *what, bool full_precision, vg_err *e)
+/* Check whether n numbers are finite in the precision of the file. */
+static int check_range(const double *x, size_t n, size_t per_item, const char *what, bool full_precision, bool may_be_full, vg_err *e)
 {
     for (size_t i = 0; i < n; i++) {
         if (isfinite(full_precision ? x[i] : (double)(float)x[i])) continue;
         if (isfinite(x[i]))
-            return vg_fail(e, VG_EINPUT, "%s %zu does not fit single precision (%g): ask for full precision", what,
-                           i / per_item, x[i]);
+            return vg_fail(e, VG_EINPUT, "%s %zu does not fit binary32 (%g)%s", what, i / per_item, x[i],
+                           may_be_full ? ": 'vg-decode --f64' writes binary64" : "");
         return vg_fail(e, VG_EINPUT, "%s %zu is not finite", what, i / per_item);
     }
     return VG_OK;
@@ -107,9 +107,10 @@ int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_
     const vg_attributes *a = w->attributes;
     if (!known) return unknown_format(format, e);
     size_t size = out->size;
-    int r = check_range(w->vertices, 3 * w->mesh->nv, 3, "vertex", w->full_precision, e);
+    const bool doubles = known->keeps & VGI_KEEPS_DOUBLES;
+    int r = check_range(w->vertices, 3 * w->mesh->nv, 3, "vertex", w->full_precision, doubles, e);
     if (r == VG_OK && a)
-        r = check_range(a->tex, a->ntex * a->tex_dim, a->tex_dim, "texture coordinate", w->full_precision, e);
+        r = check_range(a->tex, a->ntex * a->tex_dim, a->tex_dim, "texture coordinate", w->full_precision, doubles, e);
     if (r == VG_OK) r = known->write(out, w, e);
     if (r == VG_OK && w->rest) r = vgi_bytes_append(out, w->rest->data, w->rest->size, e);
     else if (r == VG_OK && known->rest) r = known->rest(out, w, e);

@@ -197,7 +197,7 @@ int vgi_npy_store(vg_bytes *to, const double *x, size_t n, bool doubles, vg_err 
         float f = (float)x[i];
         if (!isfinite(doubles ? x[i] : (double)f))
             return vg_fail(e, VG_EINPUT,
-                           "number %zu of it does not fit single precision (%g): ask for full precision", i, x[i]);
+                           "number %zu of it does not fit binary32 (%g): 'vg-decode --f64' writes binary64", i, x[i]);
         if (doubles) vgi_put64(p, vgi_double_bits(x[i]));
         else vgi_put32(p, vgi_float_bits(f));
     }

@@ -169,7 +169,7 @@ int vgi_plan_make(vgi_plan *p, const char *output, const vg_sink_options *o, vg_
     if (!p->format) p->format = &vgi_format_obj;
     if (r == VG_OK && o->full_precision &&
         !((p->sequence ? p->sequence->keeps : p->format->keeps) & VGI_KEEPS_DOUBLES))
-        r = vg_fail(e, VG_EARG, "cannot write '%s' in full precision: %s holds binary32 only", output,
+        r = vg_fail(e, VG_EARG, "cannot write '%s' as binary64: %s holds binary32 only", output,
                     p->sequence ? p->sequence->name : p->format->name);
     if (r == VG_OK) r = check_gltf_options(p, output, o, e);
     return r < 0 ? r : check_mesh_option(p, o, e);

@@ -403,7 +403,7 @@ static int check_singles(const vgi_writing *w, vg_err *e)
 {
     for (size_t i = 0; i < 3 * w->mesh->nv; i++)
         if (!isfinite((float)w->vertices[i]))
-            return vg_fail(e, VG_EINPUT, "vertex %zu does not fit single precision (%g)", i / 3, w->vertices[i]);
+            return vg_fail(e, VG_EINPUT, "vertex %zu does not fit binary32 (%g)", i / 3, w->vertices[i]);
     return VG_OK;
 }
 

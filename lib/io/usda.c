@@ -192,7 +192,7 @@ static int put_points(writing *x, const vg_frame *f, vg_err *e)
     for (size_t i = 0; i < n; i++) {
         const double *p = f->values + 3 * i;
         if (!isfinite((float)p[0]) || !isfinite((float)p[1]) || !isfinite((float)p[2]))
-            return vg_fail(e, VG_EINPUT, "vertex %zu does not fit single precision", i);
+            return vg_fail(e, VG_EINPUT, "vertex %zu does not fit binary32", i);
         if (i) *to++ = ',';
         to += print_point(to, p);
     }

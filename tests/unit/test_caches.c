@@ -192,7 +192,7 @@ static void refuses_what_does_not_fit(void)
     for (int i = 0; i < 2; i++) {
         vg_bytes b = record(i ? &vgi_sequence_mdd : &vgi_sequence_pc2, &head, frames, 3, false, &r, NULL);
         CHECK(r == VG_EINPUT);
-        CHECK_TEXT(message, "vertex 1 does not fit single precision (1e+39)");
+        CHECK_TEXT(message, "vertex 1 does not fit binary32 (1e+39)");
         vg_bytes_clear(&b);
     }
 }

@@ -150,7 +150,7 @@ static void refuses_to_write_what_does_not_fit(void)
     memcpy(x, mixed_vertices, sizeof x);
     CHECK(vgi_bytes_append(&out, "before", 6, &e) == VG_OK);
     CHECK(vg_model_write(&out, "obj", &mixed, x, NULL, false, &e) == VG_EINPUT);
-    CHECK_TEXT(e.message, "vertex 7 does not fit single precision (1e+300): ask for full precision");
+    CHECK_TEXT(e.message, "vertex 7 does not fit binary32 (1e+300): 'vg-decode --f64' writes binary64");
     CHECK(vg_model_write(&out, "fbx", &mixed, x, NULL, true, &e) == VG_EARG);
     CHECK_TEXT(e.message, "unknown mesh format 'fbx' (known: obj, ply, ply-ascii, ply-be, off, stl, stl-ascii)");
     vg_label broken = {0, VG_LABEL_GROUP, (char *)"two\nlines"};
