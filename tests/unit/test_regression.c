@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 #include "net/regression.h"
+#include "net/root.h"
 #include "test.h"
 
 #include <math.h>
@@ -124,5 +125,23 @@ static void steps_from_one_frame_are_even(void)
     vgi_regression_clear(&b);
 }
 
-TESTS({"steps from one frame are even", steps_from_one_frame_are_even}, {"stable motion is learned", stable_motion_is_learned}, {"growing motion keeps its rhythm", growing_motion_keeps_its_rhythm},
+/* A body of two components whose root turns by 90 degrees about z, from one about x. The shift is in the frame of the root before the
+ * step, the place of the other component in that after it; both are in D = 3. Vectors turned by hand. */
+static void root_and_components_move(void)
+{
+    const vg_network n = {.parts = 2, .diagonal = 3};
+    const double quarter = acos(0), half = sqrt(0.5);
+    const double steps[9] = {0, 0, quarter, 0, 1, 0, 2, 0, 0};
+    double root[4] = {half, half, 0, 0}, centroids[6] = {7, 7, 7, 1, 2, 3};
+    vgi_root_move(&n, 1, steps, root, centroids);
+    const double moved[3] = {1, 2, 3 + 3};       /* y goes to z */
+    const double other[3] = {1, 2, 3 + 3 + 3 * 2}; /* x goes to y by the turn about z, then to z */
+    for (int k = 0; k < 3; k++) CHECK_NEAR(centroids[3 + k], moved[k], 1e-14);
+    for (int k = 0; k < 3; k++) CHECK_NEAR(centroids[k], other[k], 1e-14);
+    const double turned[4] = {0.5, 0.5, -0.5, 0.5}; /* (1 + i)(1 + k) / 2, in which i k = -j */
+    for (int k = 0; k < 4; k++) CHECK_NEAR(root[k], turned[k], 1e-15);
+}
+
+TESTS({"root and components move", root_and_components_move},
+      {"steps from one frame are even", steps_from_one_frame_are_even}, {"stable motion is learned", stable_motion_is_learned}, {"growing motion keeps its rhythm", growing_motion_keeps_its_rhythm},
       {"damped motion is left alone", damped_motion_is_left_alone}, {"rhythm is learned", rhythm_is_learned})
