@@ -1,5 +1,5 @@
 /* trace.c: the curve of a signal as a fine polyline, with the distance of its shapes from a smooth motion, and its
- * self-crossings. Drawing is in view/plane.c.
+ * self-crossings. Drawing is in view/pose_plane.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/curve.h"

@@ -1,5 +1,5 @@
 /* weights.c: the linear filters in time (low-pass and polynomial) as weights of frames. The window of frames is in
- * smooth.c; the robust filter, whose weights depend on the data, is in robust_time.c.
+ * window.c; the robust filter, whose weights depend on the data, is in robust_time.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/lapack.h"
 #include "signal/smooth.h"
