@@ -35,7 +35,7 @@ run 'xz -dc $data/human-man-poses.bvh.xz >man.bvh'
 run 'mkdir -p aside && mv poses/*_003_* poses/*_006_* poses/*_007_* poses/*_010_* aside/'
 run 'rows "1 2 3 5 6 9 10 12 13 14 15" man.bvh >fit.bvh; rows "4 7 8 11" man.bvh >dance.bvh'
 
-printf '\n# The rig, as envelope and as linear blend skinning; what they miss in the poses they were fitted to:\n'
+printf '\n# The rig, an envelope mixed with skinning, and linear blend skinning alone; their errors in the poses they were fitted to:\n'
 run 'vg-fitmap --skeleton fit.bvh poses/ -o man.rig'
 run 'vg-fitmap -q --method lbs --skeleton fit.bvh poses/ -o skinning.rig'
 
@@ -63,7 +63,7 @@ run 'vg-encode --mesh $data/trex.skeleton.txt attack.joints.txt | vg-play trex.r
 run 'vg-encode --reference $data/trex.rest.obj $data/trex-attack.tar.xz |
     vg-view - --beside attack.vgs --frames 5 --size 280x200 --view 60,10 -o attack.png'
 
-printf '\n# Its foot in the walk, close up: as it is, by the envelope, by skinning:\n'
+printf '\n# Its foot in the walk, close up: as it is, by the rig, by skinning alone:\n'
 run 'vg-decode --replace walk.vgs -o steps/'
 run 'vg-play trex.rig walk.vgs | vg-decode --replace -o steps-envelope/'
 run 'vg-play trex-skinning.rig walk.vgs | vg-decode --replace -o steps-skinning/'
