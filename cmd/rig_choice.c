@@ -1,21 +1,23 @@
 /* rig_choice.c: mix envelope and skinning, vertex by vertex, with the least error in poses left out of the fit.
  *
  * In a pose left out, vertex v has the error s by skinning and s + d by the envelope; with a share a of the envelope it has
- * s + a d. The share of least squares is -(sum of s d) / (sum of d d), summed over all poses, each left out once, and over
- * the faces around the vertex.
+ * s + a d. Its squares change by 2 a (sum of s d) + a a (sum of d d), summed over the poses of a fold, each left out once, and
+ * over the faces around the vertex. The share is the one whose worst fold gains most: poses to come are farther from the
+ * fitted ones than those left out, so an envelope that loses in one fold is not taken.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "rig_choice.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { FOLDS = 3, RIDGES = 3, MOST_CANDIDATES = 2 * RIDGES, SMOOTHINGS = 2 };
+enum { FOLDS = 3, RIDGES = 3, MOST_CANDIDATES = 2 * RIDGES, SMOOTHINGS = 2, SEARCH = 24 };
 static const size_t large = 1000000; /* vertices times bones: beyond it one number of bones per corner is tried */
 
 typedef struct candidate {
     size_t bones_per_corner;
     double refine;
-    double *sums; /* 2 nv: s d, d d */
+    double *sums[FOLDS]; /* of the poses of each fold, 2 nv: s d, d d */
 } candidate;
 
 typedef struct choosing {
@@ -71,7 +73,7 @@ static void judge_batch(void *context, const fitting_batch *b)
     const double *transforms[FITTING_BATCH];
     double *sums[RIDGES];
     take_transforms(x, b, transforms);
-    for (size_t i = 0; i < x->nridges; i++) sums[i] = x->now[i].sums;
+    for (size_t i = 0; i < x->nridges; i++) sums[i] = x->now[i].sums[x->fold];
     if (vg_rig_fitter_judge(x->fitter, b->n, b->values, transforms, sums, &e) < 0) cli_die(&e);
 }
 
@@ -108,16 +110,46 @@ static void smooth(const vg_mesh *m, double *sums, double *work)
         if (work[i / 2 * 2 + 1] > 0) sums[i] = work[i];
 }
 
-/* The shares of one candidate, in share; what the sum of squares changes by. */
-static double find_shares(const vg_mesh *m, const candidate *c, double *share, double *smoothed, double *work)
+/* By what a share of the envelope changes the sum of squares of one vertex in one fold. */
+static double change_by(const double *sums, double share)
 {
+    return 2 * share * sums[0] + share * share * sums[1];
+}
+
+static double worst_change(const double *const *sums, size_t folds, size_t v, double share)
+{
+    double most = -INFINITY;
+    for (size_t f = 0; f < folds; f++) most = fmax(most, change_by(sums[f] + 2 * v, share));
+    return most;
+}
+
+/* The share between 0 and 1 whose worst fold is best: the worst of parabolas is convex. */
+static double find_share(const double *const *sums, size_t folds, size_t v)
+{
+    static const double golden = 0.6180339887498949;
+    double a = 0, b = 1;
+    for (size_t f = 0; f < folds; f++)
+        if (sums[f][2 * v] >= 0) return 0;
+    for (int i = 0; i < SEARCH; i++) {
+        double width = golden * (b - a), left = b - width, right = a + width;
+        if (worst_change(sums, folds, v, left) < worst_change(sums, folds, v, right)) b = right;
+        else a = left;
+    }
+    return (a + b) / 2;
+}
+
+/* The shares of one candidate, in share; what the sum of squares changes by. */
+static double find_shares(const choosing *x, const candidate *c, double *share, double *const *smoothed, double *work)
+{
+    const vg_mesh *m = &x->f->h->body.mesh;
     double change = 0;
-    memcpy(smoothed, c->sums, 2 * m->nv * sizeof *smoothed);
-    for (int i = 0; i < SMOOTHINGS; i++) smooth(m, smoothed, work);
+    for (size_t f = 0; f < x->folds; f++) {
+        memcpy(smoothed[f], c->sums[f], 2 * m->nv * sizeof *work);
+        for (int i = 0; i < SMOOTHINGS; i++) smooth(m, smoothed[f], work);
+    }
     for (size_t v = 0; v < m->nv; v++) {
-        double a = smoothed[2 * v + 1] > 0 ? -smoothed[2 * v] / smoothed[2 * v + 1] : 0;
-        share[v] = a < 0 ? 0 : a > 1 ? 1 : a;
-        change += 2 * share[v] * c->sums[2 * v] + share[v] * share[v] * c->sums[2 * v + 1];
+        share[v] = find_share((const double *const *)smoothed, x->folds, v);
+        for (size_t f = 0; f < x->folds; f++) change += change_by(c->sums[f] + 2 * v, share[v]);
     }
     return change;
 }
@@ -125,13 +157,14 @@ static double find_shares(const vg_mesh *m, const candidate *c, double *share, d
 static void choose_best(const choosing *x, rig_choice *choice)
 {
     const vg_mesh *m = &x->f->h->body.mesh;
-    double *share = choice_array(m->nv, sizeof *share), *smoothed = choice_array(2 * m->nv, sizeof *smoothed),
-           *work = choice_array(2 * m->nv, sizeof *work), best = 0;
+    double *share = choice_array(m->nv, sizeof *share), *work = choice_array(2 * m->nv, sizeof *work), best = 0;
+    double *smoothed[FOLDS];
+    for (int f = 0; f < FOLDS; f++) smoothed[f] = choice_array(2 * m->nv, sizeof *work);
     choice->share = choice_array(m->nv, sizeof *choice->share);
     choice->mean = 0, choice->folds = x->folds;
     choice->bones_per_corner = x->at[0].bones_per_corner, choice->refine = x->at[0].refine;
     for (size_t c = 0; c < x->n; c++) {
-        double change = find_shares(m, &x->at[c], share, smoothed, work);
+        double change = find_shares(x, &x->at[c], share, smoothed, work);
         if (!(change < best)) continue;
         best = change;
         memcpy(choice->share, share, m->nv * sizeof *share);
@@ -139,8 +172,15 @@ static void choose_best(const choosing *x, rig_choice *choice)
     }
     for (size_t v = 0; v < m->nv; v++) choice->mean += choice->share[v] / (double)m->nv;
     free(share);
-    free(smoothed);
+    for (int f = 0; f < FOLDS; f++) free(smoothed[f]);
     free(work);
+}
+
+static candidate make_candidate(size_t nv, size_t corners, double refine)
+{
+    candidate c = {.bones_per_corner = corners, .refine = refine};
+    for (int f = 0; f < FOLDS; f++) c.sums[f] = choice_array(2 * nv, sizeof *c.sums[f]);
+    return c;
 }
 
 static void list_candidates(choosing *x, const vg_rig_options *o, bool corners_given, bool refine_given)
@@ -151,8 +191,7 @@ static void list_candidates(choosing *x, const vg_rig_options *o, bool corners_g
     x->nridges = refine_given ? 1 : RIDGES;
     for (size_t corners = o->bones_per_corner + 1; corners-- > least;)
         for (size_t i = 0; i < x->nridges; i++)
-            x->at[x->n++] = (candidate){corners, refine_given ? o->refine : strengths[i],
-                                        choice_array(2 * h->body.mesh.nv, sizeof(double))};
+            x->at[x->n++] = make_candidate(h->body.mesh.nv, corners, refine_given ? o->refine : strengths[i]);
 }
 
 void rig_choose(const fitting *f, double *const *transforms, const vg_rig_options *o, bool corners_given,
@@ -169,6 +208,7 @@ void rig_choose(const fitting *f, double *const *transforms, const vg_rig_option
         try_fold(&x, o);
     }
     choose_best(&x, choice);
-    for (size_t c = 0; c < x.n; c++) free(x.at[c].sums);
+    for (size_t c = 0; c < x.n; c++)
+        for (int k = 0; k < FOLDS; k++) free(x.at[c].sums[k]);
     free(x.rank);
 }
