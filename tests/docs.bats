@@ -96,8 +96,10 @@ twisting_skeleton() {
     while IFS= read -r line; do must grep -qF "    $line" "$ROOT/README.md"; done < <(grep '^make ' "$ROOT/.ci/run")
 }
 
-@test "pages are without warnings" {
+@test "pages are without warnings, also of man with 80 columns" {
     for page in "$ROOT"/man/*.[1-9]; do must mandoc -Tlint -W warning "$page"; done
+    command -v groff >/dev/null || skip "groff is not installed"
+    for page in "$ROOT"/man/*.[1-9]; do must groff -mandoc -Tutf8 -rLL=78n "$page"; done
 }
 
 @test "pages have their sections, in order" {

@@ -28,6 +28,12 @@ flags() {
     must root/usr/bin/vg
     for program in $(each_program); do shows "$program  "; done
     shows "vg help transfer"
+    must root/usr/bin/vg --version
+    shows "vg (vg) $(sed -n 's/^#define VG_VERSION "\(.*\)"/\1/p' "$ROOT/lib/vg.h")"
+    pipe_fail 4 'root/usr/bin/vg >/dev/full'
+    [ "$stderr" = "vg: cannot write to standard output" ]
+    must sh "$ROOT/cmd/vg" # in the sources, the programs are those that were built
+    shows "vg-solve  "
     must root/usr/bin/vg info --check "$GOLDEN/smallest.vgs"
     must_fail 2 root/usr/bin/vg nonsense
     must_fail 2 root/usr/bin/vg help nonsense
