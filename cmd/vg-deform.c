@@ -21,7 +21,7 @@ static const cli_option options[] = {
     {"correspondence", 0, "FILE", "for a target with another connectivity: the output of vg-register",
      .text = &opts.correspondence, .reads = true, .needs = "onto"},
     {"by", 0, "auto|offset|blend|pose|gradient|shape",
-     "what is transferred (default: offset; with --correspondence gradient where no part of the source rests)", .choice = &opts.by_choice, .needs = "onto"},
+     "what is transferred (default: offset; with --correspondence gradient where parts of the source turn far)", .choice = &opts.by_choice, .needs = "onto"},
     {"root", 0, "centroid|stay|V",
      "motion of the body: that of the centroid (default), none, or that of vertex V", .text = &opts.root,
      .needs = "onto"},
@@ -81,8 +81,6 @@ typedef struct work {
     vg_kind kind;             /* what comes in */
     vg_deformer *deformer;
     vg_cross_transfer *carrier;
-    vg_cross_transfer *expressions; /* by offset, for poses in which part of the source rests; NULL: as the others */
-    vg_pinner *rests;         /* finds that part */
     vg_shaper *shaper;
     vg_rider *rider;
     joint_transfer *joints;   /* from one skeleton to another */
@@ -131,28 +129,13 @@ static void set_root(work *w)
 
 /* ---- frames ---- */
 
-/* The poses in which part of the source rests go by offset, the others by gradient. */
-static void carry_batch(work *w, size_t n, const double *const *in, double *const *out)
-{
-    const double *from[2][BATCH] = {{NULL}};
-    double *to[2][BATCH] = {{NULL}};
-    size_t count[2] = {0};
-    for (size_t i = 0; i < n; i++) {
-        const uint32_t *still;
-        size_t k = w->expressions && vg_pinner_find(w->rests, in[i], &still) > 0;
-        from[k][count[k]] = in[i], to[k][count[k]++] = out[i];
-    }
-    vg_cross_transfer_apply(w->carrier, count[0], from[0], to[0]);
-    if (count[1]) vg_cross_transfer_apply(w->expressions, count[1], from[1], to[1]);
-}
-
 static void run_batch(work *w, size_t n, const double *const *in, double *const *out)
 {
     switch (w->way) {
     case MEASURE: vg_deformer_measure(w->deformer, n, w->kind, in, out); break;
     case APPLY: vg_deformer_apply(w->deformer, n, in, out); break;
     case TRANSFER: vg_deformer_transfer(w->deformer, n, w->kind, in, out); break;
-    case CARRY: carry_batch(w, n, in, out); break;
+    case CARRY: vg_cross_transfer_apply(w->carrier, n, in, out); break;
     case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
     case JOINTS: break; /* in finish_frame */
     case RIDE:
@@ -197,7 +180,8 @@ static void fill_body(const work *w, vg_frame *f)
     vg_err e;
     double *anchors;
     if (w->kind != VG_VERTICES || w->way == RIDE || w->way == JOINTS) return;
-    vg_graph_root(w->from, f->values, f->root);
+    if (w->carrier) vg_cross_transfer_root(w->carrier, f->values, f->root);
+    else vg_graph_root(w->from, f->values, f->root);
     if (vg_frame_make_anchors(f, w->h->nanchors, &anchors, &e) < 0) cli_die(&e);
     vg_graph_anchors(f->values, w->h->anchors, w->h->nanchors, anchors);
 }
@@ -396,6 +380,11 @@ static void make_followers(work *w)
     if (opts.onto)
         r = vg_mover_new(&w->mover, w->from, w->source.body.reference, w->to, w->target.body.reference, h->anchors,
                          h->nanchors, root_stays(), &e);
+    if (r == VG_OK && w->carrier) {
+        double root[3];
+        vg_cross_transfer_root(w->carrier, w->source.body.reference, root);
+        vg_mover_follow(w->mover, root, vg_cross_transfer_size(w->carrier, true), vg_cross_transfer_size(w->carrier, false));
+    }
     if (r == VG_OK && pins)
         r = vg_pinner_new(&w->pinner, w->from, w->source.body.reference, w->to, pairs, opts.pin_choice == PIN_ALWAYS, &e);
     if (r < 0) cli_die(&e);
@@ -451,29 +440,22 @@ static void keep_source(work *w)
     if (from->mesh.nv) memcpy(to->reference, from->reference, 3 * from->mesh.nv * sizeof *to->reference);
 }
 
-static vg_cross_transfer *make_carrier(const work *w, vg_method method, bool expressions)
+static vg_cross_transfer *make_carrier(const work *w, vg_method method)
 {
     vg_err e;
     vg_cross_transfer *c;
     const double *target = w->target.body.reference;
     int r = vg_cross_transfer_new(&c, &w->source.body.mesh, w->source.body.reference, &w->pairs.correspondence, w->to, target,
                                   method, cli_threads(), &e);
-    if (r == VG_OK && method == VG_BY_OFFSET && w->fitted) r = vg_cross_transfer_fitted(c, target, w->fitted, expressions, &e);
+    if (r == VG_OK && method == VG_BY_OFFSET && w->fitted) r = vg_cross_transfer_fitted(c, target, w->fitted, w->by == BY_AUTO, &e);
     if (r < 0) cli_die(&e);
     return c;
-}
-
-static void make_expressions(work *w)
-{
-    vg_err e;
-    w->expressions = make_carrier(w, VG_BY_OFFSET, true);
-    if (vg_pinner_new(&w->rests, w->from, w->source.body.reference, w->from, NULL, false, &e) < 0) cli_die(&e);
 }
 
 static void make_step(work *w)
 {
     static const vg_method methods[] = {
-        [BY_AUTO] = VG_BY_GRADIENT, [BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT, [BY_BLEND] = VG_BY_BLEND,
+        [BY_AUTO] = VG_BY_OFFSET, [BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT, [BY_BLEND] = VG_BY_BLEND,
         [BY_OFFSET] = VG_BY_OFFSET};
     vg_err e;
     const vg_head *t = &w->target;
@@ -483,8 +465,7 @@ static void make_step(work *w)
     w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
-        w->carrier = make_carrier(w, method, false);
-        if (w->by == BY_AUTO && w->fitted) make_expressions(w);
+        w->carrier = make_carrier(w, method);
     } else if (w->way == SHAPE) {
         r = vg_shaper_new(&w->shaper, w->to, w->source.body.reference, t->body.reference, cli_threads(), &e);
     } else {

@@ -211,3 +211,74 @@ assert len(shares) == 10
 assert sum(shares) / 10 > 0.98 and min(shares) > 0.93 and sum(misses) / 10 < 0.035, (shares, misses)
 END
 }
+
+# ---- a head that moves as a whole ---------------------------------------------------------------------------------------
+
+# write_talk: talk-*.obj, an expression of face A, the one that moves the fewest vertices, so that part of the face rests; nod-*.obj, the same while the head turns by up to 60 degrees
+# and leaves its place; b-tri.obj, face B as triangles in another order; markers.txt
+write_talk() {
+    must vg-decode "$DATA/faceA.tar.xz" -o 'a-%02d.obj'
+    must vg-decode "$DATA/faceB.tar.xz" -o 'b-%02d.obj'
+    py <<'END'
+import math
+def read(path):
+    rows = [l.split() for l in open(path)]
+    return ([[float(x) for x in r[1:]] for r in rows if r[0] == "v"],
+            [[int(x.split("/")[0]) - 1 for x in r[1:]] for r in rows if r[0] == "f"])
+A, faces = [read(f"a-{i:02}.obj")[0] for i in range(15)], read("a-00.obj")[1]
+shape = min(A[1:], key=lambda x: sum(p != q for p, q in zip(x, A[0])))
+n, B = len(A[0]), read("b-00.obj")[0]
+order = sorted(range(n), key=lambda v: v * 7919 % n)
+new = {v: i for i, v in enumerate(order)}
+with open("b-tri.obj", "w") as out:
+    for v in order:
+        out.write("v %.6f %.6f %.6f\n" % tuple(B[v]))
+    for k, face in enumerate(faces):
+        face = [new[v] + 1 for v in face]
+        face = face[k % 4:] + face[:k % 4]
+        for i in range(1, len(face) - 1):
+            out.write("f %d %d %d\n" % (face[0], face[i], face[i + 1]))
+with open("markers.txt", "w") as out:
+    for v in range(7, n, n // 60):
+        out.write(f"{v} {new[v]}\n")
+lines = ["f " + " ".join(str(v + 1) for v in face) + "\n" for face in faces]
+for i in range(10):
+    t = i / 9
+    w = math.sin(2.5 * math.pi * t) ** 2
+    c, s = math.cos(math.pi / 3 * t * t), math.sin(math.pi / 3 * t * t)
+    with open(f"talk-{i:02}.obj", "w") as talk, open(f"nod-{i:02}.obj", "w") as nod:
+        for v, x in enumerate(A[0]):
+            y = [x[k] + w * (shape[v][k] - x[k]) for k in range(3)]
+            talk.write("v %.6f %.6f %.6f\n" % tuple(y))
+            nod.write("v %.6f %.6f %.6f\n" % (y[0] + 3 * t, c * (y[1] + 10) - s * y[2] - 10, s * (y[1] + 10) + c * y[2]))
+        talk.writelines(lines)
+        nod.writelines(lines)
+END
+}
+
+# The rigid motion is taken from the result again: what is left must be what the head does that does not move, in every frame, so
+# that no frame goes another way than its neighbour.
+@test "a face that talks while the head turns by 60 degrees goes onto another as the same face at rest does" {
+    write_talk
+    must vg-register -q a-00.obj b-tri.obj --markers markers.txt -o pairs.vgs
+    for name in talk nod; do
+        pipe "vg-encode a-00.obj $name-*.obj | vg-deform --onto b-tri.obj --correspondence pairs.vgs | vg-solve >$name.vgs"
+    done
+    py <<'END'
+import math, read_stream
+talk, nod = [[f.values for f in read_stream.read_stream(name).frames][1:] for name in ("talk.vgs", "nod.vgs")]
+n = len(talk[0])
+D = sum((max(talk[0][k::3]) - min(talk[0][k::3])) ** 2 for k in range(3)) ** 0.5
+for i, (a, b) in enumerate(zip(talk, nod)):
+    t = i / 9
+    c, s = math.cos(math.pi / 3 * t * t), math.sin(math.pi / 3 * t * t)
+    back = []
+    for v in range(0, n, 3):
+        back += [b[v] - 3 * t, c * (b[v + 1] + 10) + s * b[v + 2] - 10, c * b[v + 2] - s * (b[v + 1] + 10)]
+    off = [x - y for x, y in zip(back, a)]
+    place = [sum(off[k::3]) / (n / 3) for k in range(3)]
+    shape = sum(sum((off[v + k] - place[k]) ** 2 for k in range(3)) ** 0.5 for v in range(0, n, 3)) / (n / 3)
+    print(i, shape / D, sum(x * x for x in place) ** 0.5 / D)
+    assert shape < 2e-5 * D and sum(x * x for x in place) < (0.02 * D) ** 2, i
+END
+}

@@ -70,10 +70,17 @@ int vg_cross_transfer_new(vg_cross_transfer **c, const vg_mesh *source, const do
                    vg_method method, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_cross_transfer_free(vg_cross_transfer **c);
 /* vg_cross_transfer_fitted: the source as it was fitted to the target, source nv points, which VG_BY_OFFSET needs:
- * without it that is VG_BY_GRADIENT. expressions: the poses are sums of shapes: motions keep their size between people
- * whose meshes have one unit, and the target's offsets turn only where faces turn by more than 45 degrees. */
+ * without it that is VG_BY_GRADIENT. mixed: poses whose parts turn little go as sums of
+ * shapes: motions keep their size between people whose meshes have one unit, and the target's offsets turn with the
+ * whole body and where parts or faces turn far; the more the parts turn, the more go by gradient. */
 int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_reference, const double *fitted,
-                             bool expressions, vg_err *e) VG_MUST_CHECK;
+                             bool mixed, vg_err *e) VG_MUST_CHECK;
+/* vg_cross_transfer_root: the centroid of what drives the target in a pose: of the places of its vertices. Other parts of
+ * the source do not count. */
+void vg_cross_transfer_root(const vg_cross_transfer *c, const double *pose, double root[3]);
+/* vg_cross_transfer_size: the size of the target relative to that part; of small motions: where they keep their size, that
+ * of a unit. */
+double vg_cross_transfer_size(const vg_cross_transfer *c, bool small_motions);
 /* vg_cross_transfer_apply: n poses of the source (vertices) in, n times the target's wanted vectors out. */
 void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors);
 /* corners: source faces without a direction, over all poses */

@@ -144,6 +144,10 @@ int vg_mover_new(vg_mover **m, const vg_graph *from, const double *source_refere
 void vg_mover_free(vg_mover **m);
 /* vg_mover_move: set root and anchors of `out` from those of `in`. */
 void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out);
+/* vg_mover_follow: what the root of the source is in its reference, and the ratio of the sizes, where those of the whole
+ * meshes do not count. near: the ratio for ways that are short beside the source (up to 0.4 of its diagonal; from
+ * 1.4 on `ratio` counts). If the body stays, it does. */
+void vg_mover_follow(vg_mover *m, const double root[3], double near, double ratio);
 /* vg_mover_place: translate a pose of the target until its root is at `root`; vertices in no face stay. */
 void vg_mover_place(const vg_mover *m, const double root[3], double *vertices);
 

@@ -74,3 +74,55 @@ void vgi_place_point(const vg_mesh *source, const vgi_place *p, const double *po
     if (r > 3) vgi_face_centre(pose, vert, r, centre), c = centre;
     for (int k = 0; k < 3; k++) at[k] = a[k] + p->u[0] * (b[k] - a[k]) + p->u[1] * (c[k] - a[k]);
 }
+
+/* Add a point of the source, as vgi_place_point finds it, to the shares. */
+static void share_place(const vg_mesh *source, const vgi_place *p, double *share)
+{
+    size_t begin = source->start[p->face], r = source->start[p->face + 1] - begin, i = p->corner - begin;
+    const uint32_t *vert = source->vert + begin;
+    share[vert[i]] += 1 - p->u[0] - p->u[1];
+    share[vert[(i + 1) % r]] += p->u[0];
+    if (r <= 3) share[vert[(i + 2) % r]] += p->u[1];
+    for (size_t k = 0; r > 3 && k < r; k++) share[vert[k]] += p->u[1] / (double)r;
+}
+
+static void share_face(const vg_mesh *source, size_t f, double *share)
+{
+    double part = 1 / (double)(source->start[f + 1] - source->start[f]);
+    for (uint32_t c = source->start[f]; c < source->start[f + 1]; c++) share[source->vert[c]] += part;
+}
+
+int vgi_places_share(const vgi_place *places, const vg_mesh *source, const vg_correspondence *pairs, const vg_mesh *target,
+                     double *share, vg_err *e)
+{
+    bool *done = vgi_array(target->nv, sizeof *done, e);
+    if (!done) return VG_ENOMEM;
+    size_t n = 0;
+    memset(share, 0, source->nv * sizeof *share);
+    for (size_t f = 0; f < target->nf; f++)
+        for (uint32_t c = target->start[f]; c < target->start[f + 1]; c++) {
+            uint32_t v = target->vert[c];
+            if (done[v]) continue;
+            if (places && places[v].face != UINT32_MAX) share_place(source, &places[v], share);
+            else share_face(source, pairs->source[pairs->first[f]], share);
+            done[v] = true;
+            n++;
+        }
+    for (size_t v = 0; v < source->nv && n; v++) share[v] /= (double)n;
+    free(done);
+    return VG_OK;
+}
+
+double vgi_places_size(const vg_mesh *source, const double *reference, const vg_correspondence *pairs, const vg_mesh *target,
+                       const double *points)
+{
+    double sum[2][3] = {{0}}, square[2] = {0}, at[2][3];
+    for (size_t f = 0; f < target->nf; f++) {
+        size_t g = pairs->source[pairs->first[f]];
+        vgi_face_centre(points, target->vert + target->start[f], target->start[f + 1] - target->start[f], at[0]);
+        vgi_face_centre(reference, source->vert + source->start[g], source->start[g + 1] - source->start[g], at[1]);
+        for (size_t k = 0; k < 2; k++) vgi_add(sum[k], at[k]), square[k] += vgi_dot(at[k], at[k]);
+    }
+    for (size_t k = 0; k < 2 && target->nf; k++) square[k] -= vgi_dot(sum[k], sum[k]) / (double)target->nf;
+    return square[0] > 0 && square[1] > 0 ? sqrt(square[0] / square[1]) : 1;
+}

@@ -5,6 +5,7 @@
  * The correspondence comes from register.c; the loops over corners are in transfer_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/places.h"
+#include "method/pairs/regions.h"
 #include "method/pairs/transfer_kernel.h"
 #include "numeric/face.h"
 #include "numeric/polar.h"
@@ -18,8 +19,13 @@
 
 enum { CHUNK = 512, ENOUGH = 64 };
 static const double ALIKE = 0.5; /* largest difference of a face from its places, relative to its vectors */
-/* Expressions: cosines of the angles up to which an offset stays as it is, and from which it turns with its face. */
+/* Expressions: cosines of the angles up to which an offset does not turn with its face, and from which it does. */
 static const double STAYS = 0.707, TURNS = 0.259;
+/* The same for the neighbourhood of a face: 10 and 20 degrees. */
+static const double AROUND_STAYS = 0.985, AROUND_TURNS = 0.940;
+/* Mean angles in degrees between the parts of a source up to which a pose is a sum of shapes, and from which it goes by
+ * gradient. Expressions of a face come to 5, a walk to 20. */
+static const double SUM = 9, LIMBS = 15;
 static const double OWN_SIZE = 1.25; /* sizes that differ by less may be those of two people, measured in one unit */
 static const double COPY = 1e-3;     /* of D: target and places are one shape, in two sizes */
 
@@ -32,7 +38,9 @@ struct vg_cross_transfer {
     const double *source_reference;
     double ratio;          /* size of the target relative to the source */
     double scale;          /* of motions, by offset */
-    bool expressions;      /* offsets turn only where faces turn far */
+    vgi_regions *regions;  /* of the source, where the way depends on how far parts turn; else NULL */
+    double gradient[VGI_LANES]; /* by offset: the share of the gradients in the results, of eight poses */
+    double *share;         /* per source vertex: of the part that drives the target, see vg_cross_transfer_root */
     double *p, *q;         /* see vgi_source */
     unsigned char *slow;   /* per source face: 1: a line segment; 2: no gradient in the reference pose, never drives */
     double *segment;       /* reference vector of each source face's first corner */
@@ -224,10 +232,24 @@ static int make_arrays(vg_cross_transfer *c, vg_err *e)
     c->slow = vgi_array(nf, 1, e);
     c->bad = vgi_array(nf, 1, e);
     c->segment = vgi_array(3 * nf, sizeof *c->segment, e);
+    c->share = vgi_array(c->source->nv, sizeof *c->share, e);
     c->vectors = vgi_array(3 * vg_graph_corners(c->target), sizeof *c->vectors, e);
     c->maps = aligned_alloc(sizeof(vgi_lanes), (nf ? nf : 1) * sizeof *c->maps);
-    if (c->p && c->q && c->slow && c->bad && c->segment && c->vectors && c->maps) return VG_OK;
+    if (c->p && c->q && c->slow && c->bad && c->segment && c->share && c->vectors && c->maps) return VG_OK;
     return vg_fail(e, VG_ENOMEM, "not enough memory for a transfer of %zu faces", nf);
+}
+
+/* The target's mesh: the faces of its graph but for links. */
+static vg_mesh target_mesh(const vg_cross_transfer *c)
+{
+    const vg_graph *g = c->target;
+    return (vg_mesh){g->faces.nv, g->faces.nf - g->nlinks, g->faces.start, g->faces.vert};
+}
+
+static int measure_share(vg_cross_transfer *c, vg_err *e)
+{
+    const vg_mesh t = target_mesh(c);
+    return vgi_places_share(c->place, c->source, c->pairs, &t, c->share, e);
 }
 
 int vg_cross_transfer_new(vg_cross_transfer **out, const vg_mesh *source, const double *source_reference,
@@ -241,10 +263,11 @@ int vg_cross_transfer_new(vg_cross_transfer **out, const vg_mesh *source, const 
     if (!c) return VG_ENOMEM;
     c->source = source, c->pairs = pairs, c->target = target, c->method = method, c->threads = threads;
     atomic_init(&c->first_face, UINT64_MAX);
-    double before = vg_diagonal(source_reference, source->nv);
     c->source_reference = source_reference;
-    c->ratio = before > 0 ? vg_diagonal(target_reference, target->faces.nv) / before : 1;
     r = make_arrays(c, e);
+    if (r == VG_OK) r = measure_share(c, e);
+    const vg_mesh t = target_mesh(c);
+    c->ratio = vgi_places_size(source, source_reference, pairs, &t, target_reference);
     if (r == VG_OK && target->nlinks)
         r = vgi_incidence_make(&c->around, &target->faces, e);
     if (r == VG_OK) r = measure_source(c, source_reference, e);
@@ -274,6 +297,18 @@ double vg_cross_transfer_turned(const vg_cross_transfer *c)
     return count ? 180 / M_PI * acos(fmin(fabs(sum) / (double)count, 1)) : 0;
 }
 
+void vg_cross_transfer_root(const vg_cross_transfer *c, const double *pose, double root[3])
+{
+    root[0] = root[1] = root[2] = 0;
+    for (size_t v = 0; v < c->source->nv; v++)
+        if (c->share[v] != 0) vgi_add_scaled(root, c->share[v], pose + 3 * v);
+}
+
+double vg_cross_transfer_size(const vg_cross_transfer *c, bool small_motions)
+{
+    return small_motions && c->regions ? c->scale : c->ratio;
+}
+
 void vg_cross_transfer_free(vg_cross_transfer **out)
 {
     vg_cross_transfer *c = *out;
@@ -283,6 +318,7 @@ void vg_cross_transfer_free(vg_cross_transfer **out)
     free(c->slow);
     free(c->bad);
     free(c->segment);
+    free(c->share);
     free(c->vectors);
     free(c->place);
     free(c->placed);
@@ -290,6 +326,7 @@ void vg_cross_transfer_free(vg_cross_transfer **out)
     for (int i = 0; i < VGI_LANES; i++) free(c->points[i]);
     free(c->maps);
     vgi_incidence_clear(&c->around);
+    vgi_regions_free(&c->regions);
     free(c->twin);
     free(c->is_twin);
     vg_deformer_free(&c->deformer);
@@ -402,32 +439,79 @@ static void add_drift(const transfer_job *j, size_t f, const vgi_map *map)
         }
 }
 
-/* The rotation of an offset in an expression, from the map of its face: none for small angles, the face's for large
- * ones, and between them a mean. Expressions are sums (MATH 5). */
-static void hold_small_turns(vgi_map *map)
+/* c = a b, or a' b. */
+static void multiply_maps(const vgi_map *a, bool transposed, const vgi_map *b, vgi_map *c)
 {
-    vgi_map turn;
-    vgi_transfer_kernel_now()->polar(map, &turn);
-    for (size_t k = 0; k < VGI_LANES; k++) {
-        double cosine = (turn.m[0][k] + turn.m[4][k] + turn.m[8][k] - 1) / 2;
-        double x = fmin(fmax((STAYS - cosine) / (STAYS - TURNS), 0), 1), share = x * x * (3 - 2 * x);
-        for (int i = 0; i < 9; i++) map->m[i][k] = share * turn.m[i][k] + (i % 4 == 0 ? 1 - share : 0);
-    }
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            for (size_t k = 0; k < VGI_LANES; k++) {
+                double sum = 0;
+                for (int n = 0; n < 3; n++) sum += a->m[transposed ? 3 * n + i : 3 * i + n][k] * b->m[3 * n + j][k];
+                c->m[3 * i + j][k] = sum;
+            }
 }
 
-/* Add the vectors of the places, at the target's size. */
-static void add_places(const transfer_job *j, size_t f)
+/* The part of the turn from rotation `base` to that of `map` which counts: none for small angles, all of it for large
+ * ones, between them a share that grows smoothly. Base is turned by it. */
+static void turn_on(vgi_map *base, const vgi_map *map, double stays, double turns)
+{
+    vgi_map turn, rest, much;
+    vgi_transfer_kernel_now()->polar(map, &turn);
+    multiply_maps(base, true, &turn, &rest);
+    for (size_t k = 0; k < VGI_LANES; k++) {
+        double cosine = (rest.m[0][k] + rest.m[4][k] + rest.m[8][k] - 1) / 2;
+        double x = fmin(fmax((stays - cosine) / (stays - turns), 0), 1), share = x * x * (3 - 2 * x);
+        for (int i = 0; i < 9; i++) rest.m[i][k] = share * rest.m[i][k] + (i % 4 == 0 ? 1 - share : 0);
+    }
+    multiply_maps(base, false, &rest, &much);
+    vgi_transfer_kernel_now()->polar(&much, base);
+}
+
+/* The rotation of an offset in an expression, from the map of its face: that of the whole body, what the
+ * neighbourhood turns far, and what the face turns far beyond that. Expressions are sums (MATH 5). */
+static void hold_small_turns(const vg_cross_transfer *c, size_t f, vgi_map *map)
+{
+    vgi_map turn = *vgi_regions_whole(c->regions), around;
+    vgi_regions_around(c->regions, c->pairs->source[c->pairs->first[f]], &around);
+    turn_on(&turn, &around, AROUND_STAYS, AROUND_TURNS);
+    turn_on(&turn, map, STAYS, TURNS);
+    *map = turn;
+}
+
+/* The vectors of the places, at the target's size, and the target's offsets, turned, mixed with what is there, which
+ * has the share c->gradient. */
+static void mix_places(const transfer_job *j, size_t f, const vgi_map *turn)
 {
     const vg_cross_transfer *c = j->c;
     size_t begin = c->target->faces.start[f], r = c->target->faces.start[f + 1] - begin;
     const uint32_t *vert = c->target->faces.vert + begin;
     for (size_t k = 0; k < j->lanes; k++) {
-        double centre[3];
+        double centre[3], share = c->gradient[k];
+        if (share >= 1) continue;
         vgi_face_centre(c->points[k], vert, r, centre);
-        for (size_t i = 0; i < r; i++)
-            for (size_t a = 0; a < 3; a++)
-                j->out[k][3 * (begin + i) + a] += c->scale * (c->points[k][3 * (size_t)vert[i] + a] - centre[a]);
+        for (size_t i = 0; i < r; i++) {
+            const double *offset = c->offset + 3 * (begin + i);
+            for (size_t a = 0; a < 3; a++) {
+                double *to = &j->out[k][3 * (begin + i) + a];
+                double x = c->scale * (c->points[k][3 * (size_t)vert[i] + a] - centre[a]);
+                for (size_t b = 0; b < 3; b++) x += turn->m[3 * a + b][k] * offset[b];
+                *to = share > 0 ? share * *to + (1 - share) * x : x;
+            }
+        }
     }
+}
+
+/* A target face that goes by the places of its vertices, as far as poses do not go by gradient. */
+static void follow_places(const transfer_job *j, size_t f, vgi_map *map)
+{
+    const vg_cross_transfer *c = j->c;
+    size_t begin = c->target->faces.start[f], r = c->target->faces.start[f + 1] - begin;
+    bool some = false;
+    for (size_t k = 0; k < j->lanes; k++) some |= c->gradient[k] > 0;
+    if (some) vgi_transfer_kernel_now()->follow(map, VGI_FOLLOW_GRADIENT, c->vectors + 3 * begin, r, j->out, 3 * begin, j->lanes);
+    if (c->regions) hold_small_turns(c, f, map);
+    else vgi_transfer_kernel_now()->polar(map, map);
+    mix_places(j, f, map);
 }
 
 static void follow_face(const transfer_job *j, size_t f)
@@ -453,11 +537,9 @@ static void follow_face(const transfer_job *j, size_t f)
         }
     }
     vgi_transfer_kernel_now()->finish(&sum, weight);
-    if (placed && c->expressions) hold_small_turns(&sum);
-    vgi_transfer_kernel_now()->follow(&sum, rigid || placed ? VGI_FOLLOW_RIGID : how[c->method],
-                                      (placed ? c->offset : c->vectors) + 3 * begin,
+    if (placed) return follow_places(j, f, &sum);
+    vgi_transfer_kernel_now()->follow(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin,
                                       g->faces.start[f + 1] - begin, j->out, 3 * begin, j->lanes);
-    if (placed) add_places(j, f);
     if (f >= faces) add_drift(j, f, &sum);
 }
 
@@ -489,7 +571,7 @@ static int make_places(vg_cross_transfer *c, const double *target, const double 
 {
     const vg_graph *g = c->target;
     size_t nv = g->faces.nv;
-    const vg_mesh t = {nv, g->faces.nf - g->nlinks, g->faces.start, g->faces.vert};
+    const vg_mesh t = target_mesh(c);
     c->place = vgi_array(nv, sizeof *c->place, e);
     c->offset = vgi_array(vg_graph_corners(g), 3 * sizeof *c->offset, e);
     c->placed = vgi_array(g->faces.nf, sizeof *c->placed, e);
@@ -565,17 +647,28 @@ static void set_motion_size(vg_cross_transfer *c, const double *target)
 }
 
 int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_reference, const double *fitted,
-                             bool expressions, vg_err *e)
+                             bool mixed, vg_err *e)
 {
     const vg_graph *g = c->target;
     c->scale = vg_diagonal(fitted, c->source->nv) / vg_diagonal(c->source_reference, c->source->nv);
-    c->expressions = expressions;
     int r = make_places(c, target_reference, fitted, e);
     if (r < 0) return r;
     place_points(c, c->source_reference, c->points[0]);
-    if (expressions) set_motion_size(c, target_reference);
+    if (mixed) set_motion_size(c, target_reference);
     for (size_t f = 0; f < g->faces.nf - g->nlinks; f++) c->placed[f] = place_face(c, f);
-    return VG_OK;
+    r = measure_share(c, e);
+    if (r < 0) return r;
+    return mixed ? vgi_regions_new(&c->regions, c->source, c->source_reference, e) : VG_OK;
+}
+
+/* How far the parts of the source turn in eight poses, and the way that these go. */
+static void measure_turns(vg_cross_transfer *c)
+{
+    vgi_regions_measure(c->regions, c->maps, c->bad, c->threads);
+    for (size_t k = 0; k < VGI_LANES; k++) {
+        double x = fmin(fmax((vgi_regions_spread(c->regions)[k] - SUM) / (LIMBS - SUM), 0), 1);
+        c->gradient[k] = x * x * (3 - 2 * x);
+    }
 }
 
 void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors)
@@ -585,6 +678,7 @@ void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(c->threads, (c->source->nf + CHUNK - 1) / CHUNK, measure_chunk, &j);
         transfer_twins(&j);
+        if (c->regions) measure_turns(c);
         for (size_t k = 0; k < j.lanes && c->place; k++) place_points(c, j.poses[k], c->points[k]);
         vgi_parallel(c->threads, (c->target->faces.nf + CHUNK - 1) / CHUNK, follow_chunk, &j);
     }

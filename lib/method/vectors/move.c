@@ -2,12 +2,18 @@
  * shape.c, vertices that stay in pin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/face_rows.h"
+#include "numeric/vec3.h"
 
 #include <stdlib.h>
+
+/* Ways, in diagonals of the source, up to which the ratio of small motions counts, and from which that of the sizes. */
+static const double NEAR = 0.4, FAR = 1.4;
 
 struct vg_mover {
     const vg_graph *to;
     double ratio; /* size of the target divided by that of the source; 0: the body stays */
+    double near;  /* the same for small motions: people of two sizes nod and lean alike, but walk by their legs */
+    double reach; /* the diagonal of the source */
     size_t nanchors;
     double source[3], target[3];             /* roots in the references */
     double *source_anchors, *target_anchors; /* positions in the references */
@@ -20,7 +26,8 @@ int vg_mover_new(vg_mover **out, const vg_graph *from, const double *source, con
     vg_mover *m = *out = vgi_array(1, sizeof *m, e);
     if (!m) return VG_ENOMEM;
     m->to = to, m->nanchors = nanchors;
-    m->ratio = stay ? 0 : before > 0 ? after / before : 1;
+    m->near = m->ratio = stay ? 0 : before > 0 ? after / before : 1;
+    m->reach = before;
     vg_graph_root(from, source, m->source);
     vg_graph_root(to, target, m->target);
     m->source_anchors = vgi_array(nanchors, 3 * sizeof *m->source_anchors, e);
@@ -45,7 +52,11 @@ void vg_mover_free(vg_mover **m)
 
 static void go(const vg_mover *m, const double *source, const double *target, const double *now, double *to)
 {
-    for (int k = 0; k < 3; k++) to[k] = target[k] + (m->ratio > 0 ? m->ratio * (now[k] - source[k]) : 0);
+    double way[3];
+    vgi_subtract(now, source, way);
+    double x = m->reach > 0 ? (vgi_length(way) / m->reach - NEAR) / (FAR - NEAR) : 1, far = fmin(fmax(x, 0), 1);
+    double ratio = m->near + far * far * (3 - 2 * far) * (m->ratio - m->near);
+    for (int k = 0; k < 3; k++) to[k] = target[k] + (ratio > 0 ? ratio * way[k] : 0);
 }
 
 void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out)
@@ -55,6 +66,12 @@ void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out)
     go(m, m->source, m->target, in->root, out->root);
     for (size_t i = 0; i < 3 * m->nanchors; i += 3)
         go(m, m->source_anchors + i, m->target_anchors + i, from + i, to + i);
+}
+
+void vg_mover_follow(vg_mover *m, const double root[3], double near, double ratio)
+{
+    memcpy(m->source, root, sizeof m->source);
+    if (m->ratio > 0) m->near = near, m->ratio = ratio;
 }
 
 void vg_mover_place(const vg_mover *m, const double root[3], double *vertices)

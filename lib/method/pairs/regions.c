@@ -1,0 +1,294 @@
+/* regions.c: how the neighbourhoods of a mesh turn in a pose. The surface is divided into cells about 0.04 D wide. The
+ * map of a neighbourhood is the mean over the cells within 0.1 D that are connected to the face inside of this ball,
+ * weighted by area and distance, so that it changes smoothly over the surface. Folds as small as lips and lids hardly
+ * turn it; limbs do.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/pairs/regions.h"
+#include "model/incidence.h"
+#include "numeric/face.h"
+
+#include <stdlib.h>
+
+enum { CHUNK = 64, ROUNDS = 24 };
+static const double CELL = 0.04;   /* in D: largest distance of a face from the centre of its cell */
+static const double REACH = 0.1;   /* in D: radius of a neighbourhood */
+static const double LEAST = 1e-4;  /* difference of two rotations (Frobenius) below which the median is a mean */
+
+/* A cell near a face, and its weight there. */
+typedef struct part {
+    uint32_t cell, face;
+    double weight;
+} part;
+
+struct vgi_regions {
+    size_t n, nf;         /* cells, faces */
+    uint32_t *first_face; /* n + 1: of each cell in `face` */
+    uint32_t *face;       /* nf: by cell */
+    double *area;         /* per face */
+    uint32_t *first;      /* nf + 1: of each face in `parts` */
+    part *parts;
+    vgi_map *sum, *turn;  /* per cell, in eight poses: sum of the maps by area, and its rotation */
+    vgi_lanes *weight;    /* per cell: area of the faces that have a map */
+    vgi_map *whole;       /* the last one of `turn` */
+    double spread[VGI_LANES];
+};
+
+/* ---- construction ---- */
+
+typedef struct builder {
+    const vg_mesh *mesh;
+    vgi_incidence around;
+    double *centre;                /* per face */
+    double *nearest;               /* per face: distance to the centre of its cell */
+    uint32_t *cell;                /* per face: UINT32_MAX until it has one */
+    uint32_t *seen_face, *seen_vertex; /* the last cell whose flood came here, + 1 */
+    uint32_t *queue;
+    part *parts;
+    size_t n, room;
+    double D;
+} builder;
+
+static int make_builder(builder *b, vgi_regions *r, const vg_mesh *m, const double *reference, vg_err *e)
+{
+    b->mesh = m;
+    b->D = vg_diagonal(reference, m->nv);
+    b->centre = vgi_array(m->nf, 3 * sizeof *b->centre, e);
+    b->nearest = vgi_array(m->nf, sizeof *b->nearest, e);
+    b->cell = vgi_array(m->nf, sizeof *b->cell, e);
+    b->seen_face = vgi_array(m->nf, sizeof *b->seen_face, e);
+    b->seen_vertex = vgi_array(m->nv, sizeof *b->seen_vertex, e);
+    b->queue = vgi_array(m->nf, sizeof *b->queue, e);
+    r->area = vgi_array(m->nf, sizeof *r->area, e);
+    if (!b->centre || !b->nearest || !b->cell || !b->seen_face || !b->seen_vertex || !b->queue || !r->area) return VG_ENOMEM;
+    for (size_t f = 0; f < m->nf; f++) {
+        double area[3];
+        vgi_face_centre(reference, m->vert + m->start[f], vgi_face_size(m, f), b->centre + 3 * f);
+        vgi_face_area(reference, m->vert + m->start[f], vgi_face_size(m, f), area);
+        r->area[f] = vgi_length(area);
+        b->cell[f] = UINT32_MAX;
+    }
+    return vgi_incidence_make(&b->around, m, e);
+}
+
+static void clear_builder(builder *b)
+{
+    vgi_incidence_clear(&b->around);
+    free(b->centre);
+    free(b->nearest);
+    free(b->cell);
+    free(b->seen_face);
+    free(b->seen_vertex);
+    free(b->queue);
+    free(b->parts);
+}
+
+static int add_part(builder *b, part p, vg_err *e)
+{
+    if (b->n == b->room) {
+        size_t room = 2 * b->room + 4096;
+        part *more = realloc(b->parts, room * sizeof *more);
+        if (!more) return vg_fail(e, VG_ENOMEM, "not enough memory for the neighbourhoods of %zu faces", b->mesh->nf);
+        b->parts = more, b->room = room;
+    }
+    b->parts[b->n++] = p;
+    return VG_OK;
+}
+
+/* Face f, at distance d from the centre of a new cell: does it belong there? */
+static int reach_face(builder *b, uint32_t cell, uint32_t f, double d, vg_err *e)
+{
+    if (d <= CELL * b->D && (b->cell[f] == UINT32_MAX || d < b->nearest[f])) b->cell[f] = cell, b->nearest[f] = d;
+    double x = d / (REACH * b->D), share = 1 - x * x;
+    return add_part(b, (part){cell, f, share * share}, e);
+}
+
+/* Queue the faces around the vertices of face f that this flood has not met. */
+static void spread(builder *b, uint32_t cell, uint32_t f, size_t *end)
+{
+    const vg_mesh *m = b->mesh;
+    for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
+        uint32_t v = m->vert[c];
+        if (b->seen_vertex[v] == cell + 1) continue;
+        b->seen_vertex[v] = cell + 1;
+        for (uint32_t i = b->around.first[v]; i < b->around.first[v + 1]; i++) {
+            uint32_t g = b->around.face[i];
+            if (b->seen_face[g] == cell + 1) continue;
+            b->seen_face[g] = cell + 1;
+            b->queue[(*end)++] = g;
+        }
+    }
+}
+
+/* A new cell around a face: all faces within reach to which the way stays within reach. */
+static int flood(builder *b, uint32_t cell, uint32_t centre, vg_err *e)
+{
+    size_t end = 0;
+    b->seen_face[centre] = cell + 1;
+    b->queue[end++] = centre;
+    for (size_t i = 0; i < end; i++) {
+        uint32_t f = b->queue[i];
+        double away[3];
+        vgi_subtract(b->centre + 3 * (size_t)f, b->centre + 3 * (size_t)centre, away);
+        double d = vgi_length(away);
+        if (f != centre && !(d < REACH * b->D)) continue;
+        int r = reach_face(b, cell, f, f == centre ? 0 : d, e);
+        if (r < 0) return r;
+        spread(b, cell, f, &end);
+    }
+    return VG_OK;
+}
+
+/* Sort the faces by cell, and the parts by face. */
+static int sort_all(vgi_regions *r, const builder *b, vg_err *e)
+{
+    r->first_face = vgi_array(r->n + 1, sizeof *r->first_face, e);
+    r->face = vgi_array(r->nf, sizeof *r->face, e);
+    r->first = vgi_array(r->nf + 1, sizeof *r->first, e);
+    r->parts = vgi_array(b->n, sizeof *r->parts, e);
+    if (!r->first_face || !r->face || !r->first || !r->parts) return VG_ENOMEM;
+    for (size_t f = 0; f < r->nf; f++) r->first_face[b->cell[f] + 1]++;
+    for (size_t i = 0; i < b->n; i++) r->first[b->parts[i].face + 1]++;
+    for (size_t k = 0; k < r->n; k++) r->first_face[k + 1] += r->first_face[k];
+    for (size_t f = 0; f < r->nf; f++) r->first[f + 1] += r->first[f];
+    for (size_t f = r->nf; f-- > 0;) r->face[--r->first_face[b->cell[f] + 1]] = (uint32_t)f;
+    for (size_t i = b->n; i-- > 0;) r->parts[--r->first[b->parts[i].face + 1]] = b->parts[i];
+    for (size_t k = 0; k < r->n; k++) r->first_face[k] = r->first_face[k + 1];
+    for (size_t f = 0; f < r->nf; f++) r->first[f] = r->first[f + 1];
+    r->first_face[r->n] = (uint32_t)r->nf, r->first[r->nf] = (uint32_t)b->n;
+    return VG_OK;
+}
+
+static int make_lanes(vgi_regions *r, vg_err *e)
+{
+    r->sum = aligned_alloc(sizeof(vgi_lanes), (r->n + 1) * sizeof *r->sum);
+    r->turn = aligned_alloc(sizeof(vgi_lanes), (r->n + 1) * sizeof *r->turn);
+    r->weight = aligned_alloc(sizeof(vgi_lanes), (r->n + 1) * sizeof *r->weight);
+    if (r->sum && r->turn && r->weight) {
+        r->whole = &r->turn[r->n];
+        return VG_OK;
+    }
+    return vg_fail(e, VG_ENOMEM, "not enough memory for the neighbourhoods of %zu faces", r->nf);
+}
+
+int vgi_regions_new(vgi_regions **out, const vg_mesh *m, const double *reference, vg_err *e)
+{
+    vgi_regions *r = *out = vgi_array(1, sizeof *r, e);
+    builder b = {0};
+    if (!r) return VG_ENOMEM;
+    r->nf = m->nf;
+    int done = make_builder(&b, r, m, reference, e);
+    for (uint32_t f = 0; done == VG_OK && f < m->nf; f++)
+        if (b.cell[f] == UINT32_MAX) done = flood(&b, (uint32_t)r->n++, f, e);
+    if (done == VG_OK) done = sort_all(r, &b, e);
+    if (done == VG_OK) done = make_lanes(r, e);
+    clear_builder(&b);
+    if (done < 0) vgi_regions_free(out);
+    return done;
+}
+
+void vgi_regions_free(vgi_regions **r)
+{
+    if (!*r) return;
+    free((*r)->first_face);
+    free((*r)->face);
+    free((*r)->area);
+    free((*r)->first);
+    free((*r)->parts);
+    free((*r)->sum);
+    free((*r)->turn);
+    free((*r)->weight);
+    free(*r);
+    *r = NULL;
+}
+
+/* ---- eight poses ---- */
+
+typedef struct measure_job {
+    vgi_regions *r;
+    const vgi_map *maps;
+    const unsigned char *bad;
+} measure_job;
+
+static void measure_cells(void *context, size_t chunk)
+{
+    const measure_job *j = context;
+    vgi_regions *r = j->r;
+    size_t end = (chunk + 1) * CHUNK < r->n ? (chunk + 1) * CHUNK : r->n;
+    for (size_t k = chunk * CHUNK; k < end; k++) {
+        memset(&r->sum[k], 0, sizeof r->sum[k]);
+        memset(r->weight[k], 0, sizeof r->weight[k]);
+        for (uint32_t i = r->first_face[k]; i < r->first_face[k + 1]; i++) {
+            const vgi_drivers d = {j->maps, j->bad, &r->face[i], &r->area[r->face[i]]};
+            vgi_transfer_kernel_now()->add(&d, 0, 1, &r->sum[k], r->weight[k]);
+        }
+        vgi_transfer_kernel_now()->polar(&r->sum[k], &r->turn[k]);
+    }
+}
+
+/* One round: the mean of the cells' rotations, weighted by area and by the inverse of their difference from the last
+ * one. */
+static void improve_whole(vgi_regions *r)
+{
+    vgi_map sum;
+    memset(&sum, 0, sizeof sum);
+    for (size_t k = 0; k < r->n; k++) {
+        vgi_lanes square = {0};
+        for (int i = 0; i < 9; i++)
+            for (int lane = 0; lane < VGI_LANES; lane++) {
+                double d = r->turn[k].m[i][lane] - r->whole->m[i][lane];
+                square[lane] += d * d;
+            }
+        for (int lane = 0; lane < VGI_LANES; lane++) square[lane] = r->weight[k][lane] / sqrt(square[lane] + LEAST * LEAST);
+        for (int i = 0; i < 9; i++)
+            for (int lane = 0; lane < VGI_LANES; lane++) sum.m[i][lane] += square[lane] * r->turn[k].m[i][lane];
+    }
+    vgi_transfer_kernel_now()->polar(&sum, r->whole);
+}
+
+static void measure_spread(vgi_regions *r)
+{
+    for (int lane = 0; lane < VGI_LANES; lane++) {
+        double sum = 0, area = 0;
+        for (size_t k = 0; k < r->n; k++) {
+            double trace = 0;
+            for (int i = 0; i < 9; i++) trace += r->turn[k].m[i][lane] * r->whole->m[i][lane];
+            sum += r->weight[k][lane] * acos(fmax(-1, fmin((trace - 1) / 2, 1)));
+            area += r->weight[k][lane];
+        }
+        r->spread[lane] = area > 0 ? 180 / M_PI * sum / area : 0;
+    }
+}
+
+void vgi_regions_measure(vgi_regions *r, const vgi_map *maps, const unsigned char *bad, int threads)
+{
+    measure_job j = {r, maps, bad};
+    vgi_parallel(threads, (r->n + CHUNK - 1) / CHUNK, measure_cells, &j);
+    vgi_map sum;
+    memset(&sum, 0, sizeof sum);
+    for (size_t k = 0; k < r->n; k++)
+        for (int i = 0; i < 9; i++)
+            for (int lane = 0; lane < VGI_LANES; lane++) sum.m[i][lane] += r->weight[k][lane] * r->turn[k].m[i][lane];
+    vgi_transfer_kernel_now()->polar(&sum, r->whole);
+    for (int round = 0; round < ROUNDS; round++) improve_whole(r);
+    measure_spread(r);
+}
+
+const vgi_map *vgi_regions_whole(const vgi_regions *r)
+{
+    return r->whole;
+}
+
+const double *vgi_regions_spread(const vgi_regions *r)
+{
+    return r->spread;
+}
+
+void vgi_regions_around(const vgi_regions *r, size_t f, vgi_map *mean)
+{
+    memset(mean, 0, sizeof *mean);
+    for (uint32_t p = r->first[f]; p < r->first[f + 1]; p++) {
+        const vgi_map *sum = &r->sum[r->parts[p].cell];
+        for (int i = 0; i < 9; i++)
+            for (int lane = 0; lane < VGI_LANES; lane++) mean->m[i][lane] += r->parts[p].weight * sum->m[i][lane];
+    }
+}
