@@ -21,7 +21,7 @@ static const cli_option options[] = {
     {"correspondence", 0, "FILE", "for a target with another connectivity: the output of vg-register",
      .text = &opts.correspondence, .reads = true, .needs = "onto"},
     {"by", 0, "auto|offset|blend|pose|gradient|shape",
-     "what is transferred (default: offset; with --correspondence gradient where parts of the source turn far)", .choice = &opts.by_choice, .needs = "onto"},
+     "what is transferred (default: expressions as sums of shapes; where limbs turn offset, with --correspondence gradient)", .choice = &opts.by_choice, .needs = "onto"},
     {"root", 0, "centroid|stay|V",
      "motion of the body: that of the centroid (default), none, or that of vertex V", .text = &opts.root,
      .needs = "onto"},
@@ -80,6 +80,7 @@ typedef struct work {
     by by;
     vg_kind kind;             /* what comes in */
     vg_deformer *deformer;
+    vg_sums *sums;            /* expressions onto a mesh of the same faces; NULL: there are none */
     vg_cross_transfer *carrier;
     vg_shaper *shaper;
     vg_rider *rider;
@@ -134,7 +135,10 @@ static void run_batch(work *w, size_t n, const double *const *in, double *const 
     switch (w->way) {
     case MEASURE: vg_deformer_measure(w->deformer, n, w->kind, in, out); break;
     case APPLY: vg_deformer_apply(w->deformer, n, in, out); break;
-    case TRANSFER: vg_deformer_transfer(w->deformer, n, w->kind, in, out); break;
+    case TRANSFER:
+        vg_deformer_transfer(w->deformer, n, w->kind, in, out);
+        if (w->sums) vg_sums_mix(w->sums, n, in, out);
+        break;
     case CARRY: vg_cross_transfer_apply(w->carrier, n, in, out); break;
     case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
     case JOINTS: break; /* in finish_frame */
@@ -224,7 +228,6 @@ static void check_kind(work *w)
 {
     const char *advice = NULL;
     if (w->by == BY_AUTO && w->kind == VG_DEFORMATIONS) w->by = BY_POSE;
-    if (w->by == BY_AUTO && !opts.correspondence) w->by = BY_OFFSET;
     if (w->kind == VG_FEATURES || w->kind == VG_COORDINATES) advice = "vg-deform takes vertices, vectors or deformations";
     else if (w->kind == VG_TRANSFORMS) advice = "convert them to vertices with 'vg-play MAP' first";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";
@@ -476,6 +479,8 @@ static void make_step(work *w)
             r = vg_deformer_target(w->deformer, vectors, method, &e);
         }
         free(vectors);
+        if (r == VG_OK && w->way == TRANSFER && w->by == BY_AUTO && w->kind == VG_VERTICES)
+            r = vg_sums_new(&w->sums, w->from, w->source.body.reference, t->body.reference, cli_threads(), &e);
     }
     if (r < 0) cli_die(&e);
     make_followers(w);

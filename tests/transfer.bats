@@ -181,7 +181,7 @@ differ() {
     at_most "$selected" "$(python3 -c "print(1.03 * $all)")"
 }
 
-@test "face A onto face B: the mean error is at most 0.0018 D, with selected faces at most 3 % more" {
+@test "face A onto face B: the mean error is at most 0.0003 D, with selected faces at most 3 % more" {
     must vg-encode "$DATA/faceA.tar.xz" -o all.vgs
     must vg-encode --faces selected all.vgs -o selected.vgs
     for file in all selected; do
@@ -189,7 +189,7 @@ differ() {
     done
     all=$(vertex_error mean -c "$DATA/faceB.tar.xz" all.out)
     selected=$(vertex_error mean -c "$DATA/faceB.tar.xz" selected.out)
-    at_most "$all" 0.0018
+    at_most "$all" 0.0003
     at_most 0.0001 "$all"
     at_most "$selected" "$(python3 -c "print(1.03 * $all)")"
 }

@@ -90,6 +90,19 @@ vg_deform_stats vg_cross_transfer_get_stats(const vg_cross_transfer *c);
  * does not count. */
 double vg_cross_transfer_turned(const vg_cross_transfer *c);
 
+/* Expressions onto a mesh of the same faces, as sums of shapes: the source's motion, in its own size, is added to what the
+ * target is. It replaces what vg_deformer_transfer gives by offset, the less the further parts are turned against each
+ * other. */
+typedef struct vg_sums vg_sums;
+/* vg_sums_new: the graph of both and their references; the graph is borrowed until free. */
+int vg_sums_new(vg_sums **s, const vg_graph *g, const double *source_reference, const double *target_reference, int threads,
+                vg_err *e) VG_MUST_CHECK;
+void vg_sums_free(vg_sums **s);
+/* vg_sums_size: how much larger motions are on the target. */
+double vg_sums_size(const vg_sums *s);
+/* vg_sums_mix: n poses of the source (vertices), and the target's wanted vectors by offset, which change in place. */
+void vg_sums_mix(vg_sums *s, size_t n, const double *const *poses, double *const *vectors);
+
 /* Transfer that is exact at a few sculpted poses (MATH 11; after the example-based transfer of Cashman and Hormann
  * 2012, 4.3, as a correction of plain transfer): the error of plain transfer in the examples is subtracted in
  * proportion to a pose's similarity to them. */

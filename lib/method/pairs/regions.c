@@ -9,10 +9,29 @@
 
 #include <stdlib.h>
 
-enum { CHUNK = 64, ROUNDS = 24 };
+enum { CHUNK = 64, ROUNDS = 24, LAST = 3 }; /* of the median; the last ones sharpen it */
 static const double CELL = 0.04;   /* in D: largest distance of a face from the centre of its cell */
 static const double REACH = 0.1;   /* in D: radius of a neighbourhood */
-static const double LEAST = 1e-4;  /* difference of two rotations (Frobenius) below which the median is a mean */
+/* Cosines of the angles up to which an offset does not turn with the neighbourhood of its face, and from which it does:
+ * 12 and 22 degrees; and beyond that with the face: 45 and 75. */
+static const double AROUND_STAYS = 0.978, AROUND_TURNS = 0.927, STAYS = 0.707, TURNS = 0.259;
+/* Shares of the surface that are turned, up to which a pose is a sum of shapes, and from which its limbs move. Expressions
+ * of a face come to 0.47, a walk to 0.8. */
+static const double SUM = 0.48, LIMBS = 0.6;
+static const double HALF = 0.0038; /* 1 - cosine of 5 degrees */
+/* Differences of two rotations (Frobenius) below which the median is a mean, and beyond which a part hardly counts in the
+ * last rounds. Smaller ones would make more of rounding errors. */
+static const double LEAST = 0.01, NEAR = 0.05;
+
+/* Areas of neighbourhoods, in D^2, up to which they do not turn by themselves, and from which they do. */
+static const double SMALL = 0.0015, LARGE = 0.005;
+
+/* From 0 at a to 1 at b. */
+static double smooth_step(double x, double a, double b)
+{
+    double t = fmin(fmax((x - a) / (b - a), 0), 1);
+    return t * t * (3 - 2 * t);
+}
 
 /* A cell near a face, and its weight there. */
 typedef struct part {
@@ -25,12 +44,13 @@ struct vgi_regions {
     uint32_t *first_face; /* n + 1: of each cell in `face` */
     uint32_t *face;       /* nf: by cell */
     double *area;         /* per face */
+    double *large;        /* per face: how far its neighbourhood is large enough to be a limb, from 0 to 1 */
     uint32_t *first;      /* nf + 1: of each face in `parts` */
     part *parts;
     vgi_map *sum, *turn;  /* per cell, in eight poses: sum of the maps by area, and its rotation */
     vgi_lanes *weight;    /* per cell: area of the faces that have a map */
     vgi_map *whole;       /* the last one of `turn` */
-    double spread[VGI_LANES];
+    double spread[VGI_LANES], limbs[VGI_LANES];
 };
 
 /* ---- construction ---- */
@@ -158,6 +178,24 @@ static int sort_all(vgi_regions *r, const builder *b, vg_err *e)
     return VG_OK;
 }
 
+/* The area of the neighbourhood of each face says whether it can be a limb: an eyelash is none. */
+static int measure_size(vgi_regions *r, double D, vg_err *e)
+{
+    double *area = vgi_array(r->n, sizeof *area, e);
+    r->large = vgi_array(r->nf, sizeof *r->large, e);
+    if (area && r->large) {
+        for (size_t k = 0; k < r->n; k++)
+            for (uint32_t i = r->first_face[k]; i < r->first_face[k + 1]; i++) area[k] += r->area[r->face[i]];
+        for (size_t f = 0; f < r->nf; f++) {
+            double sum = 0;
+            for (uint32_t p = r->first[f]; p < r->first[f + 1]; p++) sum += r->parts[p].weight * area[r->parts[p].cell];
+            r->large[f] = smooth_step(sum / (D * D), SMALL, LARGE);
+        }
+    }
+    free(area);
+    return r->large ? VG_OK : VG_ENOMEM;
+}
+
 static int make_lanes(vgi_regions *r, vg_err *e)
 {
     r->sum = aligned_alloc(sizeof(vgi_lanes), (r->n + 1) * sizeof *r->sum);
@@ -180,6 +218,7 @@ int vgi_regions_new(vgi_regions **out, const vg_mesh *m, const double *reference
     for (uint32_t f = 0; done == VG_OK && f < m->nf; f++)
         if (b.cell[f] == UINT32_MAX) done = flood(&b, (uint32_t)r->n++, f, e);
     if (done == VG_OK) done = sort_all(r, &b, e);
+    if (done == VG_OK) done = measure_size(r, b.D > 0 ? b.D : 1, e);
     if (done == VG_OK) done = make_lanes(r, e);
     clear_builder(&b);
     if (done < 0) vgi_regions_free(out);
@@ -192,6 +231,7 @@ void vgi_regions_free(vgi_regions **r)
     free((*r)->first_face);
     free((*r)->face);
     free((*r)->area);
+    free((*r)->large);
     free((*r)->first);
     free((*r)->parts);
     free((*r)->sum);
@@ -225,9 +265,15 @@ static void measure_cells(void *context, size_t chunk)
     }
 }
 
-/* One round: the mean of the cells' rotations, weighted by area and by the inverse of their difference from the last
- * one. */
-static void improve_whole(vgi_regions *r)
+/* Weight of a part by its squared difference from the whole: that of a median, or one that leaves out what differs. */
+static double weigh(double square, bool sharp)
+{
+    double near = square + NEAR * NEAR;
+    return sharp ? 1 / (near * near) : 1 / sqrt(square + LEAST * LEAST);
+}
+
+/* One round: the mean of the cells' rotations, weighted by area and by how near they are to the last one. */
+static void improve_whole(vgi_regions *r, bool sharp)
 {
     vgi_map sum;
     memset(&sum, 0, sizeof sum);
@@ -238,13 +284,14 @@ static void improve_whole(vgi_regions *r)
                 double d = r->turn[k].m[i][lane] - r->whole->m[i][lane];
                 square[lane] += d * d;
             }
-        for (int lane = 0; lane < VGI_LANES; lane++) square[lane] = r->weight[k][lane] / sqrt(square[lane] + LEAST * LEAST);
+        for (int lane = 0; lane < VGI_LANES; lane++) square[lane] = r->weight[k][lane] * weigh(square[lane], sharp);
         for (int i = 0; i < 9; i++)
             for (int lane = 0; lane < VGI_LANES; lane++) sum.m[i][lane] += square[lane] * r->turn[k].m[i][lane];
     }
     vgi_transfer_kernel_now()->polar(&sum, r->whole);
 }
 
+/* The share of the surface that is turned against the whole; a part that is turned by 5 degrees counts half. */
 static void measure_spread(vgi_regions *r)
 {
     for (int lane = 0; lane < VGI_LANES; lane++) {
@@ -252,10 +299,12 @@ static void measure_spread(vgi_regions *r)
         for (size_t k = 0; k < r->n; k++) {
             double trace = 0;
             for (int i = 0; i < 9; i++) trace += r->turn[k].m[i][lane] * r->whole->m[i][lane];
-            sum += r->weight[k][lane] * acos(fmax(-1, fmin((trace - 1) / 2, 1)));
+            double x = fmax(0, (3 - trace) / 2); /* 1 - cosine */
+            sum += r->weight[k][lane] * x / (x + HALF);
             area += r->weight[k][lane];
         }
-        r->spread[lane] = area > 0 ? 180 / M_PI * sum / area : 0;
+        r->spread[lane] = area > 0 ? sum / area : 0;
+        r->limbs[lane] = smooth_step(r->spread[lane], SUM, LIMBS);
     }
 }
 
@@ -269,7 +318,7 @@ void vgi_regions_measure(vgi_regions *r, const vgi_map *maps, const unsigned cha
         for (int i = 0; i < 9; i++)
             for (int lane = 0; lane < VGI_LANES; lane++) sum.m[i][lane] += r->weight[k][lane] * r->turn[k].m[i][lane];
     vgi_transfer_kernel_now()->polar(&sum, r->whole);
-    for (int round = 0; round < ROUNDS; round++) improve_whole(r);
+    for (int round = 0; round < ROUNDS; round++) improve_whole(r, round >= ROUNDS - LAST);
     measure_spread(r);
 }
 
@@ -283,6 +332,11 @@ const double *vgi_regions_spread(const vgi_regions *r)
     return r->spread;
 }
 
+const double *vgi_regions_limbs(const vgi_regions *r)
+{
+    return r->limbs;
+}
+
 void vgi_regions_around(const vgi_regions *r, size_t f, vgi_map *mean)
 {
     memset(mean, 0, sizeof *mean);
@@ -291,4 +345,47 @@ void vgi_regions_around(const vgi_regions *r, size_t f, vgi_map *mean)
         for (int i = 0; i < 9; i++)
             for (int lane = 0; lane < VGI_LANES; lane++) mean->m[i][lane] += r->parts[p].weight * sum->m[i][lane];
     }
+}
+
+/* ---- offsets ---- */
+
+/* c = a b, or a' b. */
+static void multiply_maps(const vgi_map *a, bool transposed, const vgi_map *b, vgi_map *c)
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            for (size_t k = 0; k < VGI_LANES; k++) {
+                double sum = 0;
+                for (int n = 0; n < 3; n++) sum += a->m[transposed ? 3 * n + i : 3 * i + n][k] * b->m[3 * n + j][k];
+                c->m[3 * i + j][k] = sum;
+            }
+}
+
+/* The part of the turn from rotation `base` to that of `map` which counts: none for small angles, all of it for large
+ * ones, between them a share that grows smoothly, `most` at most. Base is turned by it. */
+static void turn_on(vgi_map *base, const vgi_map *map, double stays, double turns, double most)
+{
+    vgi_map turn, rest, much;
+    vgi_transfer_kernel_now()->polar(map, &turn);
+    multiply_maps(base, true, &turn, &rest);
+    for (size_t k = 0; k < VGI_LANES; k++) {
+        double cosine = (rest.m[0][k] + rest.m[4][k] + rest.m[8][k] - 1) / 2;
+        double share = most * smooth_step(-cosine, -stays, -turns);
+        for (int i = 0; i < 9; i++) rest.m[i][k] = share * rest.m[i][k] + (i % 4 == 0 ? 1 - share : 0);
+    }
+    multiply_maps(base, false, &rest, &much);
+    vgi_transfer_kernel_now()->polar(&much, base);
+}
+
+void vgi_regions_turn(const vgi_regions *r, size_t f, const vgi_map *map, unsigned bad, vgi_map *turn)
+{
+    vgi_map base = *r->whole, around, own;
+    vgi_regions_around(r, f, &around);
+    turn_on(&base, &around, AROUND_STAYS, AROUND_TURNS, r->large[f]);
+    own = map ? *map : base;
+    for (int i = 0; i < 9; i++)
+        for (int lane = 0; lane < VGI_LANES; lane++)
+            if (bad >> lane & 1) own.m[i][lane] = base.m[i][lane];
+    turn_on(&base, &own, STAYS, TURNS, 1);
+    *turn = base;
 }

@@ -16,9 +16,16 @@ void vgi_regions_free(vgi_regions **r);
 void vgi_regions_measure(vgi_regions *r, const vgi_map *maps, const unsigned char *bad, int threads);
 /* vgi_regions_whole: the rotation of most of the mesh: the median of its parts' rotations. */
 const vgi_map *vgi_regions_whole(const vgi_regions *r);
-/* vgi_regions_spread: how far the parts are turned from it, in degrees: the mean by area, of eight poses. */
+/* vgi_regions_spread: the share of the surface that is turned against it by more than some degrees, of eight poses. */
 const double *vgi_regions_spread(const vgi_regions *r);
+/* vgi_regions_limbs: how far a pose is no sum of shapes because limbs turn, from 0 to 1, of eight poses. */
+const double *vgi_regions_limbs(const vgi_regions *r);
 /* vgi_regions_around: the mean map of the surface around face f. */
 void vgi_regions_around(const vgi_regions *r, size_t f, vgi_map *mean);
+
+/* vgi_regions_turn: the rotation of what another mesh differs by at face f, whose map is `map`, in a sum of shapes: that of
+ * the whole, what the neighbourhood turns far, and what the face turns far beyond that. bad: lanes without a map, all if
+ * map is NULL. `turn` may be `map`. */
+void vgi_regions_turn(const vgi_regions *r, size_t f, const vgi_map *map, unsigned bad, vgi_map *turn);
 
 #endif

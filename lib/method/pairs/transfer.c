@@ -19,15 +19,6 @@
 
 enum { CHUNK = 512, ENOUGH = 64 };
 static const double ALIKE = 0.5; /* largest difference of a face from its places, relative to its vectors */
-/* Expressions: cosines of the angles up to which an offset does not turn with its face, and from which it does. */
-static const double STAYS = 0.707, TURNS = 0.259;
-/* The same for the neighbourhood of a face: 10 and 20 degrees. */
-static const double AROUND_STAYS = 0.985, AROUND_TURNS = 0.940;
-/* Mean angles in degrees between the parts of a source up to which a pose is a sum of shapes, and from which it goes by
- * gradient. Expressions of a face come to 5, a walk to 20. */
-static const double SUM = 9, LIMBS = 15;
-static const double OWN_SIZE = 1.25; /* sizes that differ by less may be those of two people, measured in one unit */
-static const double COPY = 1e-3;     /* of D: target and places are one shape, in two sizes */
 
 struct vg_cross_transfer {
     const vg_mesh *source;
@@ -98,26 +89,13 @@ static int check_fit(const vg_mesh *source, const vg_correspondence *k, const vg
 static int measure_source(vg_cross_transfer *c, const double *reference, vg_err *e)
 {
     const vg_mesh *m = c->source;
-    size_t most = 0;
-    for (size_t f = 0; f < m->nf; f++) most = source_size(c, f) > most ? source_size(c, f) : most;
-    double *w = vgi_array(3 * most, sizeof *w, e); /* the vectors of a face */
-    if (!w) return VG_ENOMEM;
-    for (size_t f = 0; f < m->nf; f++) {
-        size_t begin = m->start[f], r = source_size(c, f);
-        double P[6], size;
-        vgi_face_vectors(reference, m->vert + begin, r, w);
-        memcpy(c->segment + 3 * f, w, 3 * sizeof *w);
-        if (r == 2) {
-            c->slow[f] = w[0] != 0 || w[1] != 0 || w[2] != 0 ? 1 : 2;
-        } else if (vgi_gradient_moments(w, r, P, c->q + 3 * f, &size)) {
-            vgi_divide(c->q + 3 * f, sqrt(size));
-            for (size_t i = 0; i < r; i++) vgi_symmetric_times(P, w + 3 * i, c->p + 3 * (begin + i));
-        } else {
-            c->slow[f] = 2;
+    for (size_t f = 0; f < m->nf; f++)
+        if (source_size(c, f) == 2) {
+            double w[6];
+            vgi_face_vectors(reference, m->vert + m->start[f], 2, w);
+            memcpy(c->segment + 3 * f, w, 3 * sizeof *w);
         }
-    }
-    free(w);
-    return VG_OK;
+    return vgi_mesh_moments(m, reference, c->p, c->q, c->slow, e);
 }
 
 /* The corner of source face s that matches the first corner of target face f: the cyclic shift for which their
@@ -439,45 +417,6 @@ static void add_drift(const transfer_job *j, size_t f, const vgi_map *map)
         }
 }
 
-/* c = a b, or a' b. */
-static void multiply_maps(const vgi_map *a, bool transposed, const vgi_map *b, vgi_map *c)
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            for (size_t k = 0; k < VGI_LANES; k++) {
-                double sum = 0;
-                for (int n = 0; n < 3; n++) sum += a->m[transposed ? 3 * n + i : 3 * i + n][k] * b->m[3 * n + j][k];
-                c->m[3 * i + j][k] = sum;
-            }
-}
-
-/* The part of the turn from rotation `base` to that of `map` which counts: none for small angles, all of it for large
- * ones, between them a share that grows smoothly. Base is turned by it. */
-static void turn_on(vgi_map *base, const vgi_map *map, double stays, double turns)
-{
-    vgi_map turn, rest, much;
-    vgi_transfer_kernel_now()->polar(map, &turn);
-    multiply_maps(base, true, &turn, &rest);
-    for (size_t k = 0; k < VGI_LANES; k++) {
-        double cosine = (rest.m[0][k] + rest.m[4][k] + rest.m[8][k] - 1) / 2;
-        double x = fmin(fmax((stays - cosine) / (stays - turns), 0), 1), share = x * x * (3 - 2 * x);
-        for (int i = 0; i < 9; i++) rest.m[i][k] = share * rest.m[i][k] + (i % 4 == 0 ? 1 - share : 0);
-    }
-    multiply_maps(base, false, &rest, &much);
-    vgi_transfer_kernel_now()->polar(&much, base);
-}
-
-/* The rotation of an offset in an expression, from the map of its face: that of the whole body, what the
- * neighbourhood turns far, and what the face turns far beyond that. Expressions are sums (MATH 5). */
-static void hold_small_turns(const vg_cross_transfer *c, size_t f, vgi_map *map)
-{
-    vgi_map turn = *vgi_regions_whole(c->regions), around;
-    vgi_regions_around(c->regions, c->pairs->source[c->pairs->first[f]], &around);
-    turn_on(&turn, &around, AROUND_STAYS, AROUND_TURNS);
-    turn_on(&turn, map, STAYS, TURNS);
-    *map = turn;
-}
-
 /* The vectors of the places, at the target's size, and the target's offsets, turned, mixed with what is there, which
  * has the share c->gradient. */
 static void mix_places(const transfer_job *j, size_t f, const vgi_map *turn)
@@ -509,7 +448,7 @@ static void follow_places(const transfer_job *j, size_t f, vgi_map *map)
     bool some = false;
     for (size_t k = 0; k < j->lanes; k++) some |= c->gradient[k] > 0;
     if (some) vgi_transfer_kernel_now()->follow(map, VGI_FOLLOW_GRADIENT, c->vectors + 3 * begin, r, j->out, 3 * begin, j->lanes);
-    if (c->regions) hold_small_turns(c, f, map);
+    if (c->regions) vgi_regions_turn(c->regions, c->pairs->source[c->pairs->first[f]], map, 0, map);
     else vgi_transfer_kernel_now()->polar(map, map);
     mix_places(j, f, map);
 }
@@ -606,44 +545,15 @@ static bool place_face(vg_cross_transfer *c, size_t f)
     return off2 < ALIKE * ALIKE * size2;
 }
 
-/* The size of the target relative to that of its places on the source, both about their centroids; *miss: the mean
- * distance that is left, relative to the target's size. */
-static double relative_size(const vg_cross_transfer *c, const double *target, double *miss)
+static int set_motion_size(vg_cross_transfer *c, const double *target, vg_err *e)
 {
-    const double *places = c->points[0];
-    double from[3] = {0}, to[3] = {0}, a = 0, b = 0, S[9] = {0}, q[4], R[9], left = 0;
-    size_t n = 0, nv = c->target->faces.nv;
-    for (size_t v = 0; v < nv; v++) {
-        if (c->place[v].face == UINT32_MAX) continue;
-        vgi_add(from, places + 3 * v), vgi_add(to, target + 3 * v);
-        n++;
-    }
-    if (!n) return 0;
-    vgi_divide(from, (double)n), vgi_divide(to, (double)n);
-    for (size_t v = 0; v < nv; v++) {
-        double x[3], y[3];
-        if (c->place[v].face == UINT32_MAX) continue;
-        vgi_subtract(places + 3 * v, from, x), vgi_subtract(target + 3 * v, to, y);
-        a += vgi_dot(x, x), b += vgi_dot(y, y);
-        vgi_add_outer(S, 1, y, x);
-    }
-    if (!(a > 0) || !(b > 0)) return 0;
-    vgi_best_turn(S, q);
-    vg_quat_matrix(q, R);
-    for (int k = 0; k < 9; k++) left += S[k] * R[k];
-    *miss = sqrt(fmax(2 - 2 * left / sqrt(a * b), 0)); /* of both, at unit size */
-    return sqrt(b / a);
-}
-
-/* How much larger motions are on the target. Heads of people differ by a tenth, but a lid or a lip moves as far on
- * both (MATH 5): sizes that are near a power of ten are those of a unit, unless the shapes are the same. */
-static void set_motion_size(vg_cross_transfer *c, const double *target)
-{
-    double miss = 0, size = relative_size(c, target, &miss);
-    if (!(size > 0)) return;
-    double unit = pow(10, round(log10(size)));
-    bool people = miss > COPY && size < OWN_SIZE * unit && size * OWN_SIZE > unit;
-    c->scale = people ? unit : size;
+    size_t nv = c->target->faces.nv;
+    bool *use = vgi_array(nv, sizeof *use, e);
+    if (!use) return VG_ENOMEM;
+    for (size_t v = 0; v < nv; v++) use[v] = c->place[v].face != UINT32_MAX;
+    c->scale = vgi_motion_size(c->points[0], target, use, nv);
+    free(use);
+    return VG_OK;
 }
 
 int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_reference, const double *fitted,
@@ -654,21 +564,11 @@ int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_referenc
     int r = make_places(c, target_reference, fitted, e);
     if (r < 0) return r;
     place_points(c, c->source_reference, c->points[0]);
-    if (mixed) set_motion_size(c, target_reference);
+    if (mixed) r = set_motion_size(c, target_reference, e);
     for (size_t f = 0; f < g->faces.nf - g->nlinks; f++) c->placed[f] = place_face(c, f);
-    r = measure_share(c, e);
+    if (r == VG_OK) r = measure_share(c, e);
     if (r < 0) return r;
     return mixed ? vgi_regions_new(&c->regions, c->source, c->source_reference, e) : VG_OK;
-}
-
-/* How far the parts of the source turn in eight poses, and the way that these go. */
-static void measure_turns(vg_cross_transfer *c)
-{
-    vgi_regions_measure(c->regions, c->maps, c->bad, c->threads);
-    for (size_t k = 0; k < VGI_LANES; k++) {
-        double x = fmin(fmax((vgi_regions_spread(c->regions)[k] - SUM) / (LIMBS - SUM), 0), 1);
-        c->gradient[k] = x * x * (3 - 2 * x);
-    }
 }
 
 void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors)
@@ -678,7 +578,10 @@ void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(c->threads, (c->source->nf + CHUNK - 1) / CHUNK, measure_chunk, &j);
         transfer_twins(&j);
-        if (c->regions) measure_turns(c);
+        if (c->regions) {
+            vgi_regions_measure(c->regions, c->maps, c->bad, c->threads);
+            memcpy(c->gradient, vgi_regions_limbs(c->regions), sizeof c->gradient);
+        }
         for (size_t k = 0; k < j.lanes && c->place; k++) place_points(c, j.poses[k], c->points[k]);
         vgi_parallel(c->threads, (c->target->faces.nf + CHUNK - 1) / CHUNK, follow_chunk, &j);
     }

@@ -1,7 +1,10 @@
 /* moments.c: normal and inverse second moments of a single face.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/moments.h"
+#include "numeric/face.h"
 #include "numeric/vec3.h"
+
+#include <stdlib.h>
 
 static const double flat = 1e-12; /* relative to the sum of squared lengths: see deform_kernel.c */
 
@@ -59,4 +62,32 @@ bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3], d
     vgi_symmetric_times(P, n, q);
     vgi_scale(q, h);
     return true;
+}
+
+static void measure_face(const double *w, size_t r, double *p, double *q, unsigned char *slow)
+{
+    double P[6], size;
+    if (r == 2) {
+        *slow = w[0] != 0 || w[1] != 0 || w[2] != 0 ? 1 : 2;
+    } else if (vgi_gradient_moments(w, r, P, q, &size)) {
+        vgi_divide(q, sqrt(size));
+        for (size_t i = 0; i < 3 * r; i += 3) vgi_symmetric_times(P, w + i, p + i);
+    } else {
+        *slow = 2;
+    }
+}
+
+int vgi_mesh_moments(const vg_mesh *m, const double *reference, double *p, double *q, unsigned char *slow, vg_err *e)
+{
+    size_t most = 0;
+    for (size_t f = 0; f < m->nf; f++) most = m->start[f + 1] - m->start[f] > most ? m->start[f + 1] - m->start[f] : most;
+    double *w = vgi_array(3 * most, sizeof *w, e); /* the vectors of a face */
+    if (!w) return VG_ENOMEM;
+    for (size_t f = 0; f < m->nf; f++) {
+        size_t begin = m->start[f], r = m->start[f + 1] - begin;
+        vgi_face_vectors(reference, m->vert + begin, r, w);
+        measure_face(w, r, p + 3 * begin, q + 3 * f, &slow[f]);
+    }
+    free(w);
+    return VG_OK;
 }

@@ -15,4 +15,9 @@ bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3], d
 
 void vgi_symmetric_times(const double a[6], const double x[3], double y[3]);
 
+/* vgi_mesh_moments: of all faces: per corner p = P r, per face q = h P n / sqrt|N| (vgi_source). slow[face]: 0; 1: a line
+ * segment; 2: no gradient, or a line segment without a length. p, q and slow must be 0. */
+int vgi_mesh_moments(const vg_mesh *m, const double *reference, double *p, double *q, unsigned char *slow,
+                     vg_err *e) VG_MUST_CHECK;
+
 #endif
