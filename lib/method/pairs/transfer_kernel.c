@@ -5,7 +5,7 @@
 #include "numeric/wide_face.h"
 #include "numeric/wide_polar.h"
 
-static const vgi_polar_stop to_rounding = {.scaled = 4, .enough = 1e-16};
+static const vgi_polar_stop to_rounding = {.scaled = 4, .enough = 1e-16, .alone = true};
 
 VGI_INLINE void load_map(const vgi_map *map, size_t part, vgi_wide *m)
 {
