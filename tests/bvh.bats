@@ -160,7 +160,7 @@ END
         convention $style out.bvh -q
         must vg-diff -q --centred -t 1e-5 sticks.bvh out.bvh
     done
-    for style in few kinect roblox; do # no clavicles, whose turns are lost
+    for style in few kinect roblox cesium; do # no clavicles, whose turns are lost
         convention $style out.bvh -q
         must vg-diff -q --centred --of mean -t 0.01 sticks.bvh out.bvh
     done

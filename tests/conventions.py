@@ -277,6 +277,18 @@ def numbered():
     return body(["hips"], ["spine"], ["neck", "head"], lambda side, n: "%s_%s" % (n, side[0].lower()), ["shoulder", "arm_1", "arm_2", "arm_3", "leg_1", "leg_2", "leg_3", "leg_4"])
 
 
+def cesium():
+    """As the glTF sample CesiumMan: numbers of limbs with gaps, and backwards on the left."""
+    left, right = ["arm_joint_L__%d_" % k for k in (4, 3, 2)], ["arm_joint_R", "arm_joint_R__2_", "arm_joint_R__3_"]
+    t = [("Skeleton_torso_joint_1", None, "Hips"), ("Skeleton_torso_joint_2", "Skeleton_torso_joint_1", "LowerBack"), ("torso_joint_3", "Skeleton_torso_joint_2", "Spine1"),
+         ("Skeleton_neck_joint_1", "torso_joint_3", "Neck"), ("Skeleton_neck_joint_2", "Skeleton_neck_joint_1", "Head")]
+    for side, arm in (("Left", left), ("Right", right)):
+        for first, names, parts in (("torso_joint_3", ["Skeleton_" + n for n in arm], ("Arm", "ForeArm", "Hand")),
+                                    ("Skeleton_torso_joint_1", ["leg_joint_%s_%d" % (side[0], k) for k in (1, 2, 3, 5)], ("UpLeg", "Leg", "Foot", "ToeBase"))):
+            for name, part in zip(names, parts): t, first = t + [(name, first, side + part)], name
+    return t
+
+
 def quaternius():
     """The end of the arm is no word for a hand."""
     return body(["Body", "Hips"], ["Abdomen", "Torso"], ["Neck", "Head"], lambda side, n: "%s.%s" % (n, side[0]), ["Shoulder", "UpperArm", "LowerArm", "Grip", "UpperLeg", "LowerLeg", "Foot", None], ["Bone"])
@@ -293,7 +305,8 @@ STYLES = {"mixamo": (mixamo, 0, 1.0, False), "unreal": (unreal, 50, 1.0, True), 
           "metarig": (metarig, 30, 0.01, False), "asf": (asf, 0, 1 / 0.45, False), "few": (few, 0, 1.0, False), "vrm": (humanik, 0, 0.01, False),
           "unreal-y": (unreal, 50, 1.0, False), "rigify-y": (rigify, 45, 0.01, False), "biped": (biped, 0, 1.0, False), "motive": (motive, 0, 100, False),
           "kinect": (kinect, 10, 0.01, False), "smpl": (smpl, 0, 0.01, False), "xsens": (xsens, 88, 1.0, False), "maya": (maya, 45, 1.0, False), "roblox": (roblox, 85, 2.54, False),
-          "second-life": (second_life, 0, 0.01, False), "numbered": (numbered, 30, 1.0, False), "quaternius": (quaternius, -10, 1.0, False), "nameless": (nameless, 20, 1.0, False)}
+          "second-life": (second_life, 0, 0.01, False), "numbered": (numbered, 30, 1.0, False), "quaternius": (quaternius, -10, 1.0, False), "nameless": (nameless, 20, 1.0, False),
+          "cesium": (cesium, 60, 1.0, False)}
 LIMBS = {s + n: s + c for s in ("Left", "Right") for n, c in (("Arm", "ForeArm"), ("ForeArm", "Hand"), ("UpLeg", "Leg"), ("Leg", "Foot"))}
 
 

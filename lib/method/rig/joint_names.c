@@ -182,7 +182,7 @@ static bool drop_shared(name *names, size_t n, bool front, bool numbers)
 /* Words of a program, not of the body. */
 static bool is_filler(const name *x, int i)
 {
-    static const char *const always[] = {"joint", "jnt", "jt", "bone", "bind", "skin", "def", "org"};
+    static const char *const always[] = {"joint", "jnt", "jt", "bone", "bind", "skin", "def", "org", "skeleton", "armature", "rig"};
     static const char *const in_front[] = {"mixamorig", "bip", "character", "cc", "base", "j", "valve", "biped"};
     static const char *const middle[] = {"m", "c"};
     const char *word = x->words[i];

@@ -161,6 +161,15 @@ static bool have_limbs(const vg_skeleton *s, const vgi_role *roles)
     return false;
 }
 
+/* Without a joint of this name, the head is the last of several joints of the neck. */
+static void find_head(const body_side *x)
+{
+    uint32_t last = NONE;
+    if (has_part(x, VGI_HEAD) || count_part(x, VGI_NECK) < 2) return;
+    for (uint32_t j = find_from(x, VGI_NECK, 0); j != NONE; j = find_from(x, VGI_NECK, j + 1)) last = j;
+    x->roles[last].part = VGI_HEAD;
+}
+
 int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, bool *guessed, vg_err *e)
 {
     body_side middle = {s, roles, 0};
@@ -175,6 +184,7 @@ int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, bool *guessed, vg_err
         if (guessed) *guessed = !named && have_limbs(s, roles);
         find_hips(&middle);
         divide_spine(&middle, below);
+        find_head(&middle);
     }
     free(below);
     free(at);
