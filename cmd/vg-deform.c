@@ -72,6 +72,8 @@ typedef struct work {
     vg_head *h;               /* the source's until the output's is made of it */
     vg_head target;
     vg_head pairs;            /* holds the correspondence */
+    bool turned;              /* the target is turned against the sequence, which is turned to it by this rotation */
+    double turn[9];
     double *fitted;           /* of the correspondence: the source fitted to the target; NULL: it has none */
     vg_head source;           /* mesh and reference of the sequence, whose head gets the target's: the steps borrow
                                  them */
@@ -178,12 +180,23 @@ static void finish_frame(work *w, vg_frame *in, vg_frame *out)
     if (vg_frame_pin(out, still, n, &e) < 0) cli_die(&e);
 }
 
+/* Turn n points of the sequence to the target. */
+static void turn_points(const work *w, double *points, size_t n)
+{
+    const double *m = w->turn;
+    for (double *p = points; w->turned && p < points + 3 * n; p += 3) {
+        double x = p[0], y = p[1], z = p[2];
+        for (int k = 0; k < 3; k++) p[k] = m[3 * k] * x + m[3 * k + 1] * y + m[3 * k + 2] * z;
+    }
+}
+
 /* Frames of vertices carry neither root nor anchors: they are measured here, as vg-encode --vectors does. */
 static void fill_body(const work *w, vg_frame *f)
 {
     vg_err e;
     double *anchors;
     if (w->kind != VG_VERTICES || w->way == RIDE || w->way == JOINTS) return;
+    turn_points(w, f->values, w->from->faces.nv);
     if (w->carrier) vg_cross_transfer_root(w->carrier, f->values, f->root);
     else vg_graph_root(w->from, f->values, f->root);
     if (vg_frame_make_anchors(f, w->h->nanchors, &anchors, &e) < 0) cli_die(&e);
@@ -319,6 +332,42 @@ static void make_graphs(work *w)
     if (!w->to) w->to = w->from;
 }
 
+/* A rotation within 15 degrees of one that exchanges axes becomes it: files differ in which axis is up, people in shape. */
+static void snap_to_axes(double turn[9])
+{
+    static const double near = 0.966;
+    double axes[9] = {0}, trace = 0;
+    bool taken[3] = {false};
+    for (int i = 0; i < 3; i++) {
+        int most = 0;
+        for (int k = 1; k < 3; k++)
+            if (fabs(turn[3 * i + k]) > fabs(turn[3 * i + most])) most = k;
+        if (taken[most]) return;
+        taken[most] = true;
+        axes[3 * i + most] = turn[3 * i + most] > 0 ? 1 : -1;
+        trace += fabs(turn[3 * i + most]);
+    }
+    if ((trace - 1) / 2 > near) memcpy(turn, axes, sizeof axes);
+}
+
+/* A target that is the source with another axis up, or that looks another way, gets the motion turned along: blinks close on it.
+ * Bodies in two poses are not laid on one another by a rotation. */
+static void turn_source(work *w)
+{
+    enum { LEAST = 30 };
+    static const double alike = 0.35;
+    const double *to = opts.correspondence ? w->fitted : w->target.body.reference;
+    double miss, angle;
+    if (!opts.onto || !to || w->kind != VG_VERTICES || w->by == BY_SHAPE) return;
+    angle = vg_points_turn(w->h->body.reference, to, w->h->body.mesh.nv, w->turn, &miss);
+    w->turned = angle > LEAST && miss < alike;
+    if (!w->turned) return;
+    snap_to_axes(w->turn);
+    turn_points(w, w->h->body.reference, w->h->body.mesh.nv);
+    cli_warn("the target is turned by about %.0f degrees against the reference pose '%s': the motion is turned with it", angle,
+             w->h->body.reference_name);
+}
+
 enum { SAMPLE = 4000 }; /* faces that are asked */
 
 /* The graph of faces that are spread evenly over those of h. */
@@ -414,6 +463,7 @@ static void make_corrector(work *w)
     poses to = poses_load(opts.sculpted, MOST_EXAMPLES, &w->target.body.mesh, w->h);
     if (from.n != to.n || !from.n)
         cli_stop(VG_EINPUT, "'%s' has %zu poses and '%s' %zu: they must match", opts.examples, from.n, opts.sculpted, to.n);
+    turn_points(w, from.values, from.n * from.numbers / 3);
     const double **source = cli_allocate(from.n, sizeof *source, "examples"), **target = cli_allocate(from.n, sizeof *target, "examples");
     double **made = cli_allocate(from.n, sizeof *made, "examples");
     for (size_t i = 0; i < from.n; i++) {
@@ -559,6 +609,7 @@ static void prepare_steps(work *w)
     weld_like_sequence(w);
     set_root(w);
     make_graphs(w);
+    turn_source(w);
     make_step(w);
     warn_of_other_pose(w);
 }

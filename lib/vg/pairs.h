@@ -90,6 +90,10 @@ vg_deform_stats vg_cross_transfer_get_stats(const vg_cross_transfer *c);
  * does not count. */
 double vg_cross_transfer_turned(const vg_cross_transfer *c);
 
+/* vg_points_turn: the rotation that lays n points about their centroid nearest to as many others about theirs, and its angle
+ * in degrees. *miss: the distance that is left, both at one size, in the root of the mean square, relative to the size. */
+double vg_points_turn(const double *from, const double *to, size_t n, double turn[9], double *miss);
+
 /* Expressions onto a mesh of the same faces, as sums of shapes: the source's motion, in its own size, is added to what the
  * target is. It replaces what vg_deformer_transfer gives by offset, the less the further parts are turned against each
  * other. */

@@ -131,26 +131,26 @@ double vgi_places_size(const vg_mesh *source, const double *reference, const vg_
     return square[0] > 0 && square[1] > 0 ? sqrt(square[0] / square[1]) : 1;
 }
 
-/* The mean of the points to use. Returns how many there are. */
+/* The mean of the points to use, of all if `use` is NULL. Returns how many there are. */
 static size_t mean_of(const double *points, const bool *use, size_t n, double mean[3])
 {
     size_t count = 0;
     mean[0] = mean[1] = mean[2] = 0;
     for (size_t v = 0; v < n; v++)
-        if (use[v]) vgi_add(mean, points + 3 * v), count++;
+        if (!use || use[v]) vgi_add(mean, points + 3 * v), count++;
     if (count) vgi_divide(mean, (double)count);
     return count;
 }
 
-/* The ratio of the sizes, both about their centroids; *miss: the distance that is left when they lie on one another, in
+/* The ratio of the sizes, both about their centroids; R: the rotation from one to the other; *miss: the distance that is left when they lie on one another, in
  * the root of the mean square, relative to the size. 0: there is none. */
-static double relative_size(const double *from, const double *to, const bool *use, size_t n, double *miss)
+static double relative_size(const double *from, const double *to, const bool *use, size_t n, double R[9], double *miss)
 {
-    double means[2][3], a = 0, b = 0, S[9] = {0}, q[4], R[9], left = 0;
+    double means[2][3], a = 0, b = 0, S[9] = {0}, q[4], left = 0;
     if (!mean_of(from, use, n, means[0]) || !mean_of(to, use, n, means[1])) return 0;
     for (size_t v = 0; v < n; v++) {
         double x[3], y[3];
-        if (!use[v]) continue;
+        if (use && !use[v]) continue;
         vgi_subtract(from + 3 * v, means[0], x), vgi_subtract(to + 3 * v, means[1], y);
         a += vgi_dot(x, x), b += vgi_dot(y, y);
         vgi_add_outer(S, 1, y, x);
@@ -167,9 +167,17 @@ static double relative_size(const double *from, const double *to, const bool *us
  * are those of a unit, unless the shapes are the same. */
 double vgi_motion_size(const double *from, const double *to, const bool *use, size_t n)
 {
-    double miss = 0, size = relative_size(from, to, use, n, &miss);
+    double miss = 0, turn[9], size = relative_size(from, to, use, n, turn, &miss);
     if (!(size > 0)) return 1;
     double unit = pow(10, round(log10(size)));
     bool people = miss > COPY && size < OWN_SIZE * unit && size * OWN_SIZE > unit;
     return people ? unit : size;
+}
+
+double vg_points_turn(const double *from, const double *to, size_t n, double turn[9], double *miss)
+{
+    for (int i = 0; i < 9; i++) turn[i] = i % 4 == 0;
+    *miss = 1;
+    if (!(relative_size(from, to, NULL, n, turn, miss) > 0)) return 0;
+    return 180 / M_PI * acos(fmax(-1, fmin((turn[0] + turn[4] + turn[8] - 1) / 2, 1)));
 }
