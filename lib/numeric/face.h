@@ -6,6 +6,7 @@
 
 #include "numeric/vec3.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* vgi_face_centre: the mean of the r vertices vert[0 ..] */
@@ -37,6 +38,17 @@ static inline void vgi_face_area(const double *points, const uint32_t *vert, siz
         vgi_cross(u, v, n);
         vgi_add_scaled(area, 0.5, n);
     }
+}
+
+/* vgi_face_has_area: whether the face has more area than rounding leaves of one whose corners lie on a line; `area` as
+ * of vgi_face_area. */
+static inline bool vgi_face_has_area(const double *points, const uint32_t *vert, size_t r, double area[3])
+{
+    double longest = 0;
+    vgi_face_area(points, vert, r, area);
+    for (size_t i = 1; i < r; i++)
+        longest = fmax(longest, vgi_square(points + 3 * (size_t)vert[0], points + 3 * (size_t)vert[i]));
+    return vgi_dot(area, area) > 1e-24 * longest * longest;
 }
 
 /* vgi_triangle_normal: its length is twice the area */

@@ -174,6 +174,82 @@ static void nearest_points_by_normal(void)
     vg_head_clear(&h);
 }
 
+static double square6(const double p[3], const double n[3], const double q[3], const double m[3], double reach)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) sum += (p[k] - q[k]) * (p[k] - q[k]) + reach * reach * (n[k] - m[k]) * (n[k] - m[k]);
+    return sum;
+}
+
+/* The least measure over a grid of points of the triangles into which a surface of quads is divided. */
+static double brute_measure(const vg_head *h, const vgi_surface *s, const double p[3], const double n[3], double reach)
+{
+    enum { STEPS = 20 };
+    const vg_mesh *m = &h->body.mesh;
+    double best = INFINITY;
+    for (size_t f = 0; f < m->nf; f++)
+        for (uint32_t i = 0; i < 4; i++) {
+            uint32_t a = m->vert[4 * f + i], b = m->vert[4 * f + (i + 1) % 4];
+            const double *x = h->body.reference, *v = vgi_surface_vertex_normals(s);
+            const double *c = vgi_surface_centroids(s) + 3 * f, *cn = vgi_surface_normals(s) + 3 * f;
+            for (int j = 0; j <= STEPS; j++)
+                for (int k = 0; j + k <= STEPS; k++) {
+                    double u = j / (double)STEPS, w = k / (double)STEPS, q[3], qn[3];
+                    for (size_t d = 0; d < 3; d++) {
+                        q[d] = (1 - u - w) * x[3 * a + d] + u * x[3 * b + d] + w * c[d];
+                        qn[d] = (1 - u - w) * v[3 * a + d] + u * v[3 * b + d] + w * cn[d];
+                    }
+                    best = fmin(best, square6(p, n, q, qn, reach));
+                }
+        }
+    return best;
+}
+
+static void points_alike(void)
+{
+    vg_head h = new_shape();
+    vgi_surface *s;
+    const double reach = 0.7;
+    add_torus(&h, 12, 9, (const double[3]){0, 0, 0});
+    CHECK(vgi_surface_new(&s, &h.body.mesh, h.body.reference, NULL) == VG_OK);
+    for (int i = 0; i < 40; i++) {
+        double p[3] = {4 * noise(), 4 * noise(), 2 * noise()}, n[3] = {noise(), noise(), noise()};
+        double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        vgi_hit hit, near;
+        for (int k = 0; k < 3; k++) n[k] /= length;
+        double brute = brute_measure(&h, s, p, n, reach);
+        CHECK(vgi_surface_alike(s, p, n, -1, reach, INFINITY, INFINITY, &hit));
+        CHECK_NEAR(hit.measure, square6(p, n, hit.point, hit.normal, reach), 1e-12);
+        CHECK(hit.measure <= brute + 1e-12 && hit.measure > brute - 0.05);
+        CHECK(vgi_surface_nearest(s, p, NULL, 0, INFINITY, &near) && near.square <= hit.square + 1e-12);
+        /* the bound of the measure excludes what is above it, that of the distance what is farther */
+        CHECK(!vgi_surface_alike(s, p, n, -1, reach, INFINITY, 0.99 * hit.measure, &hit));
+        CHECK(!vgi_surface_alike(s, p, n, -1, reach, 0.99 * near.square, INFINITY, &hit));
+    }
+    vgi_surface_free(&s);
+    vg_head_clear(&h);
+}
+
+/* A point beside a ridge whose normal is that of the ridge goes towards it. */
+static void ridges(void)
+{
+    vg_head h = new_shape();
+    for (int i = 0; i < 6; i++) add_vertex(&h, i % 3 - 1, i / 3, i % 3 == 1); /* a roof along y */
+    FACE(&h, 0, 1, 4, 3);
+    FACE(&h, 1, 2, 5, 4);
+    vgi_surface *s;
+    vgi_hit near, alike;
+    const double p[3] = {0.3, 0.5, 0.7}, up[3] = {0, 0, 1};
+    CHECK(vgi_surface_new(&s, &h.body.mesh, h.body.reference, NULL) == VG_OK);
+    CHECK(vgi_surface_nearest(s, p, up, 0.4, INFINITY, &near));
+    CHECK_NEAR(near.point[0], 0.3, 1e-12);
+    CHECK(vgi_surface_alike(s, p, up, 0.4, 0.5, INFINITY, INFINITY, &alike) && alike.point[0] < 0.25);
+    CHECK(vgi_surface_alike(s, p, up, 0.4, 100, INFINITY, INFINITY, &alike));
+    CHECK_NEAR(alike.point[0], 0, 1e-3);
+    vgi_surface_free(&s);
+    vg_head_clear(&h);
+}
+
 /* The tree leaves out boxes whose normals do not fit: it finds what the nearest of surfaces of one face each finds. */
 static void boxes_of_other_normals_are_left_out(void)
 {
@@ -709,7 +785,7 @@ static void dense_seeds(void)
     free(moved);
 }
 
-TESTS({"nearest points", nearest_points}, {"nearest points by normal", nearest_points_by_normal},
+TESTS({"nearest points", nearest_points}, {"nearest points by normal", nearest_points_by_normal}, {"points alike", points_alike}, {"ridges", ridges},
       {"boxes of other normals are left out", boxes_of_other_normals_are_left_out},
       {"sparse systems", sparse_systems}, {"markers as text", markers_as_text}, {"seeds as text", seeds_as_text},
       {"identity on real meshes", identity_on_real_meshes},

@@ -15,6 +15,9 @@
  * square root of its area), smoothed over a length by (1 + length^2 L)^-1: R of single faces would follow every dent
  * and keep the result rough.
  *
+ * The nearest point of a vertex is the one whose position and normal together differ least (vgi_surface_alike): lips,
+ * lids and nostrils then pull to their like, not to what happens to be nearest.
+ *
  * Rough alignment of the meshes is in register.c, L with its matrices in springs.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/springs.h"
@@ -38,6 +41,9 @@ static const double FIRST_LIMIT = 0.1, LAST_LIMIT = 0.02; /* nearest points fart
 static const double TIED_LIMIT = 0.07;    /* the first limit at least, once ties have brought the surfaces together */
 static const double TIMES_MEDIAN = 8;     /* the first limit, in medians of the distances after the ties */
 static const double COSINE = 0.4;         /* least cosine of the angle between matching normals */
+static const double REACH = 0.01;         /* normals that differ by 1 count as much as points at this distance, */
+static const double SMOOTH = 0.1;         /* where adjacent normals differ by this at most; less on coarser meshes,
+                                             whose normals are less certain */
 static const double MAP_SPAN = 0.07;      /* length over which the maps of faces are smoothed */
 static const double KEPT_STRETCH = 0.8;   /* exponent of a map's stretch: parts without constraints return to their
                                              own size */
@@ -68,6 +74,7 @@ typedef struct fit {
     size_t row;        /* of the maps that is being smoothed */
     double *face_map, *map; /* maps D of the faces; of the vertices, smooth and without shear */
     double edge;       /* mean length */
+    double reach;      /* see REACH */
     vgi_cholesky *smoother; /* smoothing operator of the maps */
     bool *border;      /* nv: of the source */
     vgi_smoothness smooth; /* its matrix.value is the matrix to factorise */
@@ -75,6 +82,7 @@ typedef struct fit {
     double *x, *rhs, *normal, *tmp; /* nv x 3 */
     double *pull;      /* nv: weight of the nearest point in this round; 0: none */
     double *goal;      /* nv x 3: the nearest point */
+    double *goal_normal; /* nv x 3: there */
     double *distance;  /* nv */
     reverse *reverse;  /* per target vertex; weight 0: no pull */
     vgi_surface *now;  /* the source at the start of the round */
@@ -359,21 +367,6 @@ static int solve_round(fit *t, vg_err *e)
     return r;
 }
 
-static void vertex_normals(const vg_mesh *m, const double *x, double sign, double *normal)
-{
-    memset(normal, 0, 3 * m->nv * sizeof *normal);
-    for (size_t f = 0; f < m->nf; f++) {
-        double n[3];
-        vgi_face_area(x, m->vert + m->start[f], m->start[f + 1] - m->start[f], n);
-        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
-            vgi_add(normal + 3 * (size_t)m->vert[c], n);
-    }
-    for (size_t v = 0; v < m->nv; v++) {
-        double *n = normal + 3 * v, size = vgi_length(n);
-        for (int k = 0; k < 3; k++) n[k] = size > 0 ? sign * n[k] / size : 0;
-    }
-}
-
 /* Only border vertices of the source may use a nearest point on the border of the target; interior vertices would be
  * pulled to it from outside. */
 static void find_near(void *context, size_t block)
@@ -383,16 +376,18 @@ static void find_near(void *context, size_t block)
     for (size_t v = block * BLOCK; v < end; v++) {
         vgi_hit hit;
         const double *at = t->x + 3 * v, *normal = t->normal + 3 * v;
-        double limit = t->limit * t->limit, known = vgi_square(at, t->goal + 3 * v);
+        double limit = t->limit * t->limit, known = vgi_square(at, t->goal + 3 * v), most = INFINITY;
         /* the previous result is an upper bound if its normal still matches */
-        bool guess = t->distance[v] < INFINITY && known < limit;
+        if (t->distance[v] < INFINITY && known < limit)
+            most = (known + t->reach * t->reach * vgi_square(normal, t->goal_normal + 3 * v)) * (1 + 1e-9);
         t->distance[v] = INFINITY;
         if (!(t->L.sum[v] > 0) || (t->in->take_vertex && !t->in->take_vertex[v])) continue;
-        bool found = guess && vgi_surface_nearest(t->in->target, at, normal, COSINE, known * (1 + 1e-9), &hit);
-        if (!found && !vgi_surface_nearest(t->in->target, at, normal, COSINE, limit, &hit)) continue;
+        bool found = most < INFINITY && vgi_surface_alike(t->in->target, at, normal, COSINE, t->reach, limit, most, &hit);
+        if (!found && !vgi_surface_alike(t->in->target, at, normal, COSINE, t->reach, limit, INFINITY, &hit)) continue;
         if (hit.border && !t->border[v]) continue;
         t->distance[v] = sqrt(hit.square);
         memcpy(t->goal + 3 * v, hit.point, sizeof hit.point);
+        memcpy(t->goal_normal + 3 * v, hit.normal, sizeof hit.normal);
     }
 }
 
@@ -407,7 +402,7 @@ static void find_reverse(void *context, size_t block)
         double sign = t->in->flipped ? -1 : 1, normal[3] = {sign * n[0], sign * n[1], sign * n[2]};
         vgi_hit hit;
         p->weight = 0;
-        if (!vgi_surface_nearest(t->now, at, normal, COSINE, t->limit * t->limit, &hit) || hit.border) continue;
+        if (!vgi_surface_alike(t->now, at, normal, COSINE, t->reach, t->limit * t->limit, INFINITY, &hit) || hit.border) continue;
         size_t begin = t->m->start[hit.face], r = t->m->start[hit.face + 1] - begin, first = hit.corner - begin;
         if (r < 3 || r > VGI_SMALL_FACE) continue;
         *p = (reverse){.face = hit.face, .weight = 1 - hit.square / (t->limit * t->limit)};
@@ -434,7 +429,8 @@ static int follow_reverse(fit *t, double weight, vg_err *e)
  * its position. */
 static void follow_target(fit *t, double weight, bool first)
 {
-    vertex_normals(t->m, t->x, t->in->flipped ? -1 : 1, t->normal);
+    vgi_vertex_normals(t->m, t->x, t->normal, t->tmp);
+    for (size_t i = 0; t->in->flipped && i < 3 * t->m->nv; i++) t->normal[i] = -t->normal[i];
     vgi_parallel(t->in->threads, (t->m->nv + BLOCK - 1) / BLOCK, find_near, t);
     for (size_t v = 0; v < t->m->nv; v++) {
         bool found = t->distance[v] < INFINITY;
@@ -514,6 +510,31 @@ static void measure_edges(fit *t)
     t->tie = MARKER * (1 + t->stretch);
 }
 
+/* Median difference between the normals of adjacent vertices. */
+static int adjacent_normals(const vg_mesh *m, const double *normal, double *median, vg_err *e)
+{
+    size_t n = 0;
+    double *turn = vgi_array(vg_mesh_corners(m), sizeof *turn, e);
+    if (!turn) return VG_ENOMEM;
+    for (size_t f = 0; f < m->nf; f++)
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
+            uint32_t next = c + 1 < m->start[f + 1] ? c + 1 : m->start[f];
+            turn[n++] = vgi_square(normal + 3 * (size_t)m->vert[c], normal + 3 * (size_t)m->vert[next]);
+        }
+    *median = n ? sqrt(vgi_median(turn, n)) : 0;
+    free(turn);
+    return VG_OK;
+}
+
+static int measure_reach(fit *t, vg_err *e)
+{
+    double source = 0, target = 0;
+    int r = adjacent_normals(t->m, vgi_surface_vertex_normals(t->in->source_surface), &source, e);
+    if (r == VG_OK) r = adjacent_normals(t->in->target_mesh, vgi_surface_vertex_normals(t->in->target), &target, e);
+    t->reach = REACH * fmin(1, SMOOTH / fmax(source, target));
+    return r;
+}
+
 static int prepare_fit(fit *t, vg_err *e)
 {
     const vg_mesh *m = t->m;
@@ -521,9 +542,11 @@ static int prepare_fit(fit *t, vg_err *e)
     int r = vgi_incidence_make(&t->around, m, e);
     if (r == VG_OK) r = vgi_springs_make(&t->L, t->in, e);
     if (r == VG_OK) measure_edges(t);
+    if (r == VG_OK) r = measure_reach(t, e);
     if (r == VG_OK) r = vgi_smoothness_make(&t->smooth, &t->L, e);
     if (r == VG_OK) r = vgi_cholesky_new(&t->solver, &t->smooth.matrix, NULL, e);
-    double **points[] = {&t->laplacian, &t->x, &t->rhs, &t->normal, &t->tmp, &t->goal};
+    double **points[] = {&t->laplacian, &t->x, &t->rhs, &t->normal, &t->tmp, &t->goal,
+                         &t->goal_normal};
     for (size_t i = 0; i < sizeof points / sizeof *points; i++)
         if (!(*points[i] = vgi_array(nv, 3 * sizeof(double), e))) return VG_ENOMEM;
     t->inverse = vgi_array(nf, 9 * sizeof(double), e);
@@ -556,7 +579,7 @@ static void clear_fit(fit *t)
 {
     double *arrays[] = {t->laplacian, t->inverse, t->h_normal, t->area, t->trust, t->face_map,
                         t->map, t->x, t->rhs, t->normal, t->tmp, t->pull, t->goal,
-                        t->distance};
+                        t->goal_normal, t->distance};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     vgi_laplacian_clear(&t->L);
     vgi_smoothness_clear(&t->smooth);

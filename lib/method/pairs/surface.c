@@ -9,6 +9,7 @@
 #include <stdlib.h>
 
 enum { LEAF = 4, DEEPEST = 34 };
+static const double OPPOSITE = 1e-9; /* what rounding leaves of normals that cancel, relative to their areas */
 
 struct triangle {
     double a[3], ab[3], ac[3];
@@ -88,7 +89,7 @@ static void make_triangles(vgi_surface *s, const double *points, const bool *tak
         const uint8_t *border = s->border + begin;
         double *C = s->centroid + 3 * f, *n = s->normal + 3 * f;
         vgi_face_centre(points, vert, r, C);
-        vgi_face_area(points, vert, r, n);
+        if (!vgi_face_has_area(points, vert, r, n)) memset(n, 0, 3 * sizeof *n);
         s->size[f] = sqrt(vgi_make_unit(n));
         const double *p = points + 3 * (size_t)vert[0], *q = points + 3 * (size_t)vert[1];
         if (r == 2) s->size[f] = sqrt(vgi_square(p, q));
@@ -106,15 +107,24 @@ static void make_triangles(vgi_surface *s, const double *points, const bool *tak
     }
 }
 
-static void make_vertex_normals(vgi_surface *s)
+void vgi_vertex_normals(const vg_mesh *m, const double *points, double *normal, double *area)
 {
-    const vg_mesh *m = s->m;
+    memset(normal, 0, 3 * m->nv * sizeof *normal);
+    memset(area, 0, m->nv * sizeof *area);
     for (size_t f = 0; f < m->nf; f++) {
-        if (m->start[f + 1] - m->start[f] == 2) continue;
-        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
-            vgi_add_scaled(s->vertex_normal + 3 * (size_t)m->vert[c], s->size[f] * s->size[f], s->normal + 3 * f);
+        double n[3];
+        if (!vgi_face_has_area(points, m->vert + m->start[f], m->start[f + 1] - m->start[f], n)) continue;
+        double size = vgi_length(n);
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
+            vgi_add(normal + 3 * (size_t)m->vert[c], n);
+            area[m->vert[c]] += size;
+        }
     }
-    for (size_t v = 0; v < m->nv; v++) vgi_make_unit(s->vertex_normal + 3 * v);
+    for (size_t v = 0; v < m->nv; v++) {
+        double *n = normal + 3 * v;
+        if (vgi_length(n) > OPPOSITE * area[v]) vgi_make_unit(n);
+        else n[0] = n[1] = n[2] = 0;
+    }
 }
 
 /* Compares triangles by their centre along an axis. The order is total, so that the tree is always the same. */
@@ -310,12 +320,14 @@ int vgi_surface_of(vgi_surface **out, const vg_mesh *m, const double *points, co
     s->vertex_normal = vgi_array(m->nv, 3 * sizeof *s->vertex_normal, e);
     s->border = vgi_array(vg_mesh_corners(m), 1, e);
     s->triangle = vgi_array_raw(s->n, sizeof *s->triangle, e);
-    bool ok =
-        s->normal && s->centroid && s->size && s->vertex_normal && s->border && s->triangle && find_borders(s, e);
+    double *area = vgi_array(m->nv, sizeof *area, e);
+    bool ok = s->normal && s->centroid && s->size && s->vertex_normal && s->border && s->triangle && area &&
+              find_borders(s, e);
     if (ok) {
         make_triangles(s, points, take);
-        make_vertex_normals(s);
+        vgi_vertex_normals(m, points, s->vertex_normal, area);
     }
+    free(area);
     if (ok && grow_tree(s, e) == VG_OK) return VG_OK;
     vgi_surface_free(out);
     return VG_ENOMEM;
@@ -429,78 +441,153 @@ static double triangle_distance(const struct triangle *t, const double p[3], dou
     return best;
 }
 
-/* Whether the normal fits. On sharp edges and tips the vertex normals are tested too, because normals of the adjacent
- * faces do not represent the surface there. */
-static bool normal_fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal,
-                 double cosine)
+/* Smoothed normals at a, b and c of a triangle: the centroid of a larger face has that of the face, the end of a line
+ * segment has its own. */
+static void smoothed_normals(const vgi_surface *s, const struct triangle *t, const double *n[3])
 {
-    const double *n = s->normal + 3 * (size_t)t->face;
-    if (!normal || !(vgi_dot(n, n) > 0) || vgi_dot(n, normal) >= cosine) return true;
-    uint32_t begin = s->m->start[t->face], r = s->m->start[t->face + 1] - begin,
-             next = begin + (t->corner - begin + 1) % r;
-    const double *a = corner_normal(s, t->corner), *b = corner_normal(s, next),
-                 *c = r == 3 ? corner_normal(s, begin + 2) : n;
-    double smooth[3];
-    for (int k = 0; k < 3; k++) smooth[k] = (1 - u[0] - u[1]) * a[k] + u[0] * b[k] + u[1] * c[k];
-    double length = vgi_length(smooth);
-    return length > 0 && vgi_dot(smooth, normal) >= cosine * length;
+    uint32_t begin = s->m->start[t->face], r = s->m->start[t->face + 1] - begin;
+    n[0] = corner_normal(s, t->corner), n[1] = corner_normal(s, begin + (t->corner - begin + 1) % r);
+    n[2] = r == 3 ? corner_normal(s, begin + 2) : r == 2 ? n[1] : s->normal + 3 * (size_t)t->face;
 }
 
-static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const double p[3], const double *normal,
-                     double cosine, double *best, vgi_hit *hit)
+static void smoothed_normal(const double *const n[3], const double u[2], double smooth[3])
+{
+    for (int k = 0; k < 3; k++) smooth[k] = (1 - u[0] - u[1]) * n[0][k] + u[0] * n[1][k] + u[1] * n[2][k];
+}
+
+/* What is looked for; sine: that of the cosine's angle. */
+struct query {
+    const double *p, *normal;
+    double cosine, sine, reach, limit;
+};
+
+/* Whether the normal fits. On sharp edges and tips the vertex normals are tested too, because normals of the adjacent
+ * faces do not represent the surface there. */
+static bool normal_fits(const vgi_surface *s, const struct triangle *t, const double u[2], const struct query *q)
+{
+    const double *n = s->normal + 3 * (size_t)t->face, *ends[3];
+    if (!q->normal || !(vgi_dot(n, n) > 0) || vgi_dot(n, q->normal) >= q->cosine) return true;
+    double smooth[3];
+    smoothed_normals(s, t, ends);
+    smoothed_normal(ends, u, smooth);
+    double length = vgi_length(smooth);
+    return length > 0 && vgi_dot(smooth, q->normal) >= q->cosine * length;
+}
+
+/* Point and normal, the latter times the reach, are one point in six dimensions, and so is each point of a triangle:
+ * their squared distance. u and touched as for triangle_distance. */
+static double alike_distance(const vgi_surface *s, const struct triangle *t, const struct query *q, double u[2],
+                             uint8_t *touched)
+{
+    const double *n[3];
+    double ab[6], ac[6], ap[6], b2 = 0, c2 = 0, bc = 0, pb = 0, pc = 0, best = INFINITY;
+    smoothed_normals(s, t, n);
+    for (size_t k = 0; k < 3; k++) {
+        ab[k] = t->ab[k], ac[k] = t->ac[k], ap[k] = q->p[k] - t->a[k];
+        ab[3 + k] = q->reach * (n[1][k] - n[0][k]), ac[3 + k] = q->reach * (n[2][k] - n[0][k]);
+        ap[3 + k] = q->reach * (q->normal[k] - n[0][k]);
+    }
+    for (size_t k = 0; k < 6; k++) {
+        b2 += ab[k] * ab[k], c2 += ac[k] * ac[k], bc += ab[k] * ac[k];
+        pb += ab[k] * ap[k], pc += ac[k] * ap[k];
+    }
+    double det = b2 * c2 - bc * bc, a2 = b2 - 2 * bc + c2; /* a2: of the edge from b to c */
+    double v = (c2 * pb - bc * pc) / det, w = (b2 * pc - bc * pb) / det;
+    bool inside = det > 1e-24 * b2 * c2 && v >= 0 && w >= 0 && v + w <= 1;
+    double on_bc = a2 > 0 ? clamp01((b2 - bc + pc - pb) / a2) : 0;
+    const double at[4][2] = {{v, w}, {b2 > 0 ? clamp01(pb / b2) : 0, 0}, {1 - on_bc, on_bc}, {0, c2 > 0 ? clamp01(pc / c2) : 0}};
+    *touched = 0;
+    for (int i = inside ? 0 : 1; i < (inside ? 1 : 4); i++) {
+        double square = 0;
+        for (size_t k = 0; k < 6; k++) {
+            double d = ap[k] - at[i][0] * ab[k] - at[i][1] * ac[k];
+            square += d * d;
+        }
+        uint8_t edge = (uint8_t)(i ? 1 << (i - 1) : 0);
+        if (square < best) best = square, u[0] = at[i][0], u[1] = at[i][1], *touched = edge;
+        else if (!(square > best)) *touched |= edge;
+    }
+    return best;
+}
+
+static void set_hit(const vgi_surface *s, const struct triangle *t, const struct query *q, const double u[2],
+                    uint8_t touched, double measure, vgi_hit *hit)
+{
+    *hit = (vgi_hit){.face = t->face, .measure = measure, .border = touched & t->borders, .corner = t->corner,
+                     .u = {u[0], u[1]}};
+    memcpy(hit->point, t->a, sizeof t->a);
+    vgi_add_scaled(hit->point, u[0], t->ab), vgi_add_scaled(hit->point, u[1], t->ac);
+    hit->square = measure;
+    if (!(q->reach > 0)) return;
+    const double *n[3];
+    smoothed_normals(s, t, n);
+    smoothed_normal(n, u, hit->normal);
+    hit->square = vgi_square(q->p, hit->point);
+}
+
+static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const struct query *q, double *best, vgi_hit *hit)
 {
     for (size_t i = begin; i < end; i++) {
         const struct triangle *t = &s->triangle[i];
         double u[2] = {0, 0};
         uint8_t touched;
-        double square = triangle_distance(t, p, u, &touched);
-        if (!(square <= *best) || (!(square < *best) && t->face >= hit->face) || !normal_fits(s, t, u, normal, cosine))
-            continue;
-        *best = square;
-        *hit = (vgi_hit){.face = t->face, .square = square, .border = touched & t->borders,
-                         .corner = t->corner, .u = {u[0], u[1]}};
-        memcpy(hit->point, t->a, sizeof t->a);
-        vgi_add_scaled(hit->point, u[0], t->ab), vgi_add_scaled(hit->point, u[1], t->ac);
+        double measure = q->reach > 0 ? alike_distance(s, t, q, u, &touched) : triangle_distance(t, q->p, u, &touched);
+        if (!(measure <= *best) || (!(measure < *best) && t->face >= hit->face) || !normal_fits(s, t, u, q)) continue;
+        vgi_hit found;
+        set_hit(s, t, q, u, touched, measure, &found);
+        if (found.square <= q->limit) *best = measure, *hit = found;
     }
 }
 
 /* Whether some normal in the box may fit: the angle to its axis is at most that of the cone and that of the cosine together. */
-static bool may_fit(const struct box *b, const double *normal, double cosine, double sine)
+static bool may_fit(const struct box *b, const struct query *q)
 {
-    if (!normal || b->cosine < 0 || !(b->cosine > -cosine)) return true;
-    return vgi_dot(b->axis, normal) >= cosine * b->cosine - sine * b->sine;
+    if (!q->normal || b->cosine < 0 || !(b->cosine > -q->cosine)) return true;
+    return vgi_dot(b->axis, q->normal) >= q->cosine * b->cosine - q->sine * b->sine;
 }
 
-bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *normal, double cosine, double limit,
-                         vgi_hit *hit)
+/* The least measure of at most `best`. The distance to a box is a lower bound of it. */
+static bool search(const vgi_surface *s, const struct query *q, double best, vgi_hit *hit)
 {
     struct place {
         uint64_t node;
         int depth;
         double square;
     } stack[DEEPEST + 2];
-    double best = limit, sine = sqrt(fmax(0, 1 - cosine * cosine));
     int top = 0;
-    if (normal && !(vgi_dot(normal, normal) > 0)) normal = NULL;
     hit->face = UINT32_MAX;
-    if (s->n) stack[top++] = (struct place){1, 0, box_distance(&s->box[1], p)};
+    if (s->n) stack[top++] = (struct place){1, 0, box_distance(&s->box[1], q->p)};
     while (top > 0) {
         struct place at = stack[--top];
-        if (at.square > best) continue;
+        if (at.square > best || at.square > q->limit) continue;
         if (at.depth == s->depth) {
             size_t begin, end;
             node_range(s->n, at.node, at.depth, &begin, &end);
-            try_leaf(s, begin, end, p, normal, cosine, &best, hit);
+            try_leaf(s, begin, end, q, &best, hit);
             continue;
         }
-        struct place near = {2 * at.node, at.depth + 1, box_distance(&s->box[2 * at.node], p)};
-        struct place far = {2 * at.node + 1, at.depth + 1, box_distance(&s->box[2 * at.node + 1], p)};
+        struct place near = {2 * at.node, at.depth + 1, box_distance(&s->box[2 * at.node], q->p)};
+        struct place far = {2 * at.node + 1, at.depth + 1, box_distance(&s->box[2 * at.node + 1], q->p)};
         if (far.square < near.square) {
             struct place swap = near;
             near = far, far = swap;
         }
-        if (far.square <= best && may_fit(&s->box[far.node], normal, cosine, sine)) stack[top++] = far;
-        if (near.square <= best && may_fit(&s->box[near.node], normal, cosine, sine)) stack[top++] = near;
+        if (far.square <= best && may_fit(&s->box[far.node], q)) stack[top++] = far;
+        if (near.square <= best && may_fit(&s->box[near.node], q)) stack[top++] = near;
     }
     return hit->face != UINT32_MAX;
+}
+
+bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *normal, double cosine, double limit,
+                         vgi_hit *hit)
+{
+    return vgi_surface_alike(s, p, normal, cosine, 0, limit, limit, hit);
+}
+
+bool vgi_surface_alike(const vgi_surface *s, const double p[3], const double *normal, double cosine, double reach,
+                       double limit, double most, vgi_hit *hit)
+{
+    if (normal && !(vgi_dot(normal, normal) > 0)) normal = NULL;
+    const struct query q = {p, normal, cosine, sqrt(fmax(0, 1 - cosine * cosine)), normal ? reach : 0, limit};
+    return search(s, &q, q.reach > 0 ? most : limit, hit);
 }

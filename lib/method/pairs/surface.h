@@ -13,6 +13,8 @@ typedef struct vgi_hit {
     uint32_t face;
     bool border;     /* on an edge with one face */
     double square;   /* squared distance */
+    double measure;  /* what was least: the squared distance, or see vgi_surface_alike */
+    double normal[3]; /* vgi_surface_alike: the smoothed normal, not of unit length */
     double point[3];
     /* The point is a + u0 (b - a) + u1 (c - a): a is the vertex of this corner, b that of the next one; c is the vertex
      * of the third corner in a triangle, the centroid in a larger face, and b in a line segment. */
@@ -31,8 +33,11 @@ const double *vgi_surface_normals(const vgi_surface *s);   /* nf x 3: unit norma
 const double *vgi_surface_centroids(const vgi_surface *s); /* nf x 3 */
 /* vgi_surface_sizes: nf: square root of the area, or the length of a line segment. */
 const double *vgi_surface_sizes(const vgi_surface *s);
-/* vgi_surface_vertex_normals: nv x 3: unit normals, area-weighted; 0 where undefined. */
+/* vgi_surface_vertex_normals: nv x 3: as of vgi_vertex_normals. */
 const double *vgi_surface_vertex_normals(const vgi_surface *s);
+/* vgi_vertex_normals: normal (nv x 3, out): unit normals, area-weighted; 0 where they are undefined: without area, or
+ * where the faces cancel. area: room for nv numbers. */
+void vgi_vertex_normals(const vg_mesh *m, const double *points, double *normal, double *area);
 /* vgi_surface_border: whether the edge from this corner to the next one is a border. */
 bool vgi_surface_border(const vgi_surface *s, uint32_t corner);
 
@@ -42,6 +47,11 @@ bool vgi_surface_border(const vgi_surface *s, uint32_t corner);
  * the same distance the lowest face wins, so the result does not depend on the order of the search. */
 bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *normal, double cosine, double limit,
                          vgi_hit *hit);
+/* vgi_surface_alike: the point within the squared distance `limit` for which the squared distance plus `reach`^2 times
+ * the squared difference of its smoothed normal from `normal` is least: on a ridge the ridge, though a point beside it
+ * is nearer. hit->measure is this sum; no result has a larger one than `most`. Else like vgi_surface_nearest. */
+bool vgi_surface_alike(const vgi_surface *s, const double p[3], const double *normal, double cosine, double reach,
+                       double limit, double most, vgi_hit *hit);
 
 
 #endif
