@@ -44,8 +44,8 @@ static const double COSINE = 0.4;         /* least cosine of the angle between m
 static const double REACH = 0.01;         /* normals that differ by 1 count as much as points at this distance, */
 static const double SMOOTH = 0.1;         /* where adjacent normals differ by this at most; less on coarser meshes,
                                              whose normals are less certain */
-static const double MAP_SPAN = 0.07;      /* length over which the maps of faces are smoothed */
-static const double KEPT_STRETCH = 0.8;   /* exponent of a map's stretch: parts without constraints return to their
+static const double MAP_SPAN = 0.03;      /* length over which the maps of faces are smoothed */
+static const double KEPT_STRETCH = 0.5;   /* exponent of a map's stretch: parts without constraints return to their
                                              own size */
 
 enum {

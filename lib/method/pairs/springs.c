@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 enum { HUB = 100 }; /* number of neighbours */
+static const double SHORTEST = 0.05; /* relative to the mean: springs do not get stronger below */
 
 /* Springs between all corners of a small face; in a large one along edges, to the second neighbours, and across. */
 static int add_face(vgi_edges *l, const uint32_t *vert, size_t size, vg_err *e)
@@ -41,10 +42,25 @@ static int gather_springs(vgi_edges *l, const vgi_fitting *in, vg_err *e)
     return r;
 }
 
+/* A spring is as strong as it is short, relative to the mean: where points are dense the surface is not softer. */
+static void divide_by_lengths(vgi_edges *l, const double *rest)
+{
+    double sum = 0, weight = 0;
+    for (size_t i = 0; i < l->n; i++) {
+        sum += l->at[i].weight * sqrt(vgi_square(rest + 3 * (size_t)l->at[i].a, rest + 3 * (size_t)l->at[i].b));
+        weight += l->at[i].weight;
+    }
+    for (size_t i = 0; i < l->n && sum > 0; i++) {
+        double length = sqrt(vgi_square(rest + 3 * (size_t)l->at[i].a, rest + 3 * (size_t)l->at[i].b));
+        l->at[i].weight /= fmax(length * weight / sum, SHORTEST);
+    }
+}
+
 int vgi_springs_make(vgi_laplacian *L, const vgi_fitting *in, vg_err *e)
 {
     vgi_edges list = {0};
     int r = gather_springs(&list, in, e);
+    if (r == VG_OK) divide_by_lengths(&list, in->rest);
     if (r == VG_OK) return vgi_laplacian_make(L, in->source->nv, &list, e);
     vgi_edges_clear(&list);
     *L = (vgi_laplacian){0};
