@@ -140,6 +140,13 @@ with Page("mirror.html", seconds=240) as page:
     assert [p[0] for p in made] == ["handLeft", "nose", "handRight"] and made[2][1] == made[2][2], made
     a = int(made[2][1])
     assert max(abs(s * p - q) for s, p, q in zip((-1, 1, 1), points[far], points[a])) < 1e-3, (points[far], points[a])
+    # a pair that was clicked beside the place across is that place's pair
+    beside = min((i for i in range(n) if points[i] != points[a]), key=lambda i: sum((p - q) ** 2 for p, q in zip(points[i], points[a])))
+    load(f"handLeft {far} {far}\nother {beside} {beside}\n")
+    page.wait("document.documentElement.dataset.pairs.includes('other')")
+    page.click("#pair-mirror")
+    page.settle()
+    assert len(pairs()) == 2, pairs()
 END
     must vg-register -q a.obj b.obj --markers markers.txt -o pairs.vgs
 }

@@ -80,14 +80,20 @@ function acrossVertex(side, v) {
     return nearestVertex(s, [2 * mid[side] - p[0], p[1], p[2]], [-n[0], n[1], n[2]], 0.03);
 }
 
-/* For each whole pair the pair across: a pair that has its source vertex takes its target vertex from it. */
+/* How far vertices v and w of a side are apart; Infinity where the surface faces another way, as a lip does from the other. */
+function apart(side, v, w) {
+    const s = sequences[SIDES.indexOf(side)], p = placeNow(s, v), q = placeNow(s, w), n = normalOf(s, v), m = normalOf(s, w);
+    return n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < 0 ? Infinity : Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+}
+
+/* For each whole pair the pair across, unless one is near there; the pair nearest to it that lacks its target vertex takes it. */
 function mirror() {
     remember();
     for (const pair of marking.pairs.filter(whole)) {
-        const a = acrossVertex("a", pair.a), b = acrossVertex("b", pair.b);
-        if (a === null || b === null || marking.pairs.some((p) => whole(p) && (p.a === a || p.b === b))) continue;
-        const place = placeNow(sequences[0], a), near = (p) => Math.hypot(...placeNow(sequences[0], p.a).map((x, k) => x - place[k])) < 0.01;
-        const waiting = marking.pairs.find((p) => p.a !== null && p.b === null && near(p));
+        const a = acrossVertex("a", pair.a), b = acrossVertex("b", pair.b), near = (p) => apart("a", p.a, a);
+        if (a === null || b === null) continue;
+        if (marking.pairs.some((p) => whole(p) && (p.a === a || p.b === b || near(p) < 0.01 && apart("b", p.b, b) < 0.03))) continue;
+        const waiting = marking.pairs.filter((p) => p.a !== null && p.b === null && near(p) < 0.01).sort((p, q) => near(p) - near(q))[0];
         if (waiting) waiting.b = b;
         else marking.pairs.push({name: otherName(pair.name), a, b});
     }
