@@ -15,6 +15,8 @@ static const uint32_t NONE = UINT32_MAX;
 static const double SLOW = 0.15;    /* a joint stands below this share of its fast speed */
 static const double LOW = 0.12;     /* and below this height above its lowest position, relative to the length of the
                                      * leg */
+static const double RAISED = 0.15;  /* a heel is on the ground at most this far above the ball, relative to their distance
+                                     * at rest */
 static const double STRETCH = 0.999; /* largest distance from hip to foot, relative to the length of the leg */
 enum { SHORTEST = 3 };              /* fewest poses of a contact */
 
@@ -50,11 +52,17 @@ static size_t bone_of(const vg_rig *g, uint32_t joint)
     return b;
 }
 
-static void joint_at(const vg_rig *g, uint32_t joint, const double *transforms, double at[3])
+/* Position in a pose of a point that moves with a joint and is at `rest` at rest. */
+static void point_at(const vg_rig *g, uint32_t joint, const double rest[3], const double *transforms, double at[3])
 {
     const double *t = transforms + 7 * bone_of(g, joint);
-    vg_quat_apply(t, g->at + 3 * (size_t)joint, at);
+    vg_quat_apply(t, rest, at);
     vgi_add(at, t + 4);
+}
+
+static void joint_at(const vg_rig *g, uint32_t joint, const double *transforms, double at[3])
+{
+    point_at(g, joint, g->at + 3 * (size_t)joint, transforms, at);
 }
 
 static void group_bones(const vg_rig *g, leg *l)
@@ -158,7 +166,21 @@ static void find_stands(feet *f, uint32_t joint, double leg_length)
     double fast = f->n ? vgi_select(f->speed + f->n, f->n, f->n * 9 / 10) : 0;
     for (size_t i = 0; i < f->n; i++)
         f->stands[i] = f->speed[i] <= SLOW * fast && height(f, f->path + 3 * i) <= lowest + LOW * leg_length;
-    drop_short_stands(f);
+}
+
+/* A foot does not stand on a heel that is above its ball, however low and slow the ankle is. At rest, the heel is below
+ * the ankle and as low as the ball. */
+static void lift_heels(feet *f, const leg *l)
+{
+    const double *at = f->r->at, *toe = at + 3 * (size_t)l->toe;
+    double rest[3], heel[3], ball[3], high = RAISED * rest_distance(f->r, l->foot, l->toe);
+    memcpy(rest, at + 3 * (size_t)l->foot, sizeof rest);
+    if (height(f, toe) < height(f, rest)) rest[f->up] = toe[f->up];
+    for (size_t i = 0; i < f->n; i++) {
+        point_at(f->r, l->foot, rest, f->transforms[i], heel);
+        joint_at(f->r, l->toe, f->transforms[i], ball);
+        if (height(f, heel) > height(f, ball) + high) f->stands[i] = false;
+    }
 }
 
 /* ---- target of the foot ---- */
@@ -185,6 +207,8 @@ static void hold_joint(feet *f, leg *l, uint32_t joint)
 {
     if (joint == NONE) return;
     find_stands(f, joint, l->length[0] + l->length[1]);
+    if (joint == l->foot && l->toe != NONE) lift_heels(f, l);
+    drop_short_stands(f);
     for (size_t i = 0, end; i < f->n; i = end + 1) {
         for (end = i; end < f->n && f->stands[end]; end++) {}
         if (end > i) hold_stand(f, l, i, end);
