@@ -675,6 +675,11 @@ static void joints_find_their_partners(void)
     /* a shoulder is a clavicle beside an arm, and the arm itself above an elbow */
     pair_rows(3, (const char *const[]){"L_Collar", "L_Shoulder", "L_Elbow"}, 3,
               (const char *const[]){"shoulder.L", "upper_arm.L", "forearm.L"}, (const int[]){0, 1, 2});
+    /* beside an arm on the other side, a shoulder without an arm is a clavicle */
+    pair_rows(4, (const char *const[]){"RightShoulder", "RightArm", "RightForeArm", "LeftShoulder"}, 4,
+              (const char *const[]){"clavicle_r", "upperarm_r", "clavicle_l", "upperarm_l"}, (const int[]){0, 1, -1, 2});
+    pair_rows(4, (const char *const[]){"LeftShoulder", "LeftArm", "LeftForeArm", "RightShoulder"}, 4,
+              (const char *const[]){"clavicle_r", "upperarm_r", "clavicle_l", "upperarm_l"}, (const int[]){2, 3, -1, 0});
     /* a hip is the middle of the body, or a thigh */
     pair_rows(3, (const char *const[]){"Hip", "r_hip", "RightKnee"}, 3,
               (const char *const[]){"Hips", "RightUpLeg", "RightLeg"}, (const int[]){0, 1, 2});

@@ -55,6 +55,14 @@ static void deal_parts(const body_side *x, vgi_part from, const vgi_part *to, si
     }
 }
 
+/* Whether the shoulder of the other side is a joint above its upper arm. */
+static bool other_has_clavicle(const body_side *x)
+{
+    body_side other = {x->s, x->roles, -x->side};
+    return (has_part(&other, VGI_CLAVICLE) || has_part(&other, VGI_SHOULDER)) &&
+           (has_part(&other, VGI_UPPER_ARM) || has_part(&other, VGI_ARM));
+}
+
 static void decide_arm(const body_side *x)
 {
     static const vgi_part whole[] = {VGI_UPPER_ARM, VGI_FOREARM, VGI_HAND};
@@ -63,7 +71,8 @@ static void decide_arm(const body_side *x)
     if (upper) rename_part(x, VGI_ARM, fore ? VGI_NO_PART : VGI_FOREARM);
     else if (fore) rename_part(x, VGI_ARM, VGI_UPPER_ARM);
     else deal_parts(x, VGI_ARM, whole, 3);
-    rename_part(x, VGI_SHOULDER, !upper && !arms ? VGI_UPPER_ARM : clavicle ? VGI_NO_PART : VGI_CLAVICLE);
+    bool moves_arm = !upper && !arms && (fore || clavicle || !other_has_clavicle(x)); /* not if this arm is missing */
+    rename_part(x, VGI_SHOULDER, moves_arm ? VGI_UPPER_ARM : clavicle ? VGI_NO_PART : VGI_CLAVICLE);
 }
 
 static void decide_leg(const body_side *x)
