@@ -359,8 +359,9 @@ static void report_fit(work *w)
         x->first = rig_array(nv, sizeof *x->first), x->second = rig_array(nv, sizeof *x->second);
     }
     fitting_pass(&w->poses, NULL, judge_batch, w);
-    cli_say("%zu bones, %zu vertices, %zu poses; errors in 1e-3 D:  mean  sigma largest", w->h->body.rig.nbones, nv,
-            w->poses.n);
+    size_t bones = w->h->body.rig.nbones;
+    cli_say("%zu bone%s, %zu vertices, %zu poses; errors in 1e-3 D:  mean  sigma largest", bones, bones == 1 ? "" : "s",
+            nv, w->poses.n);
     for (int i = 0; i < 4; i++) {
         const fitting_errors *x = &w->errors[i / 2][i % 2];
         if (x->poses)

@@ -55,15 +55,16 @@ static void report_map(report *r, const vg_map *m)
 {
     char line[160];
     bool bones = m->kind == VG_MAP_BONES;
+    const char *plural = m->n == 1 ? "" : "s";
     if (!m->n) return;
     report_gap(r);
     report_group(r, "map");
     report_put(r, "kind", NULL, report_text(bones ? "bones" : "patches"));
     report_put(r, "transforms", NULL, report_count(m->n));
     report_put(r, "per_corner", NULL, report_count(m->ncorners ? m->per_corner : 0));
-    if (!bones) snprintf(line, sizeof line, "%zu patches", m->n);
-    else if (!m->ncorners) snprintf(line, sizeof line, "%zu bones, by linear blend skinning alone", m->n);
-    else snprintf(line, sizeof line, "%zu bones, %zu for each corner", m->n, m->per_corner);
+    if (!bones) snprintf(line, sizeof line, "%zu patch%s", m->n, m->n == 1 ? "" : "es");
+    else if (!m->ncorners) snprintf(line, sizeof line, "%zu bone%s, by linear blend skinning alone", m->n, plural);
+    else snprintf(line, sizeof line, "%zu bone%s, %zu for each corner", m->n, plural, m->per_corner);
     report_put(r, NULL, "map of", report_text(line));
     report_put(r, "hinges", bones ? NULL : "hinges", report_count(m->nhinges));
     report_put(r, "held_vertices", "held", report_count(m->nheld));
