@@ -176,6 +176,9 @@ END
     vg-encode free.glb -o skin.vgs
     vg-diff --tolerance 1e-5 fit.vgs skin.vgs >/dev/null
     vg-info free.rig | grep -q 'rig  4 joints, 4 of them turn'
+    vg-fitmap --bones 1 fit.vgs -o one.rig 2>one
+    grep -q '^vg-fitmap: 1 bone, ' one
+    vg-info one.rig | grep -q '1 bone, by linear blend skinning'
     vg-fitmap -v --bones 20 fit.vgs -o many.rig 2>many
     must_fail 2 vg-fitmap --bones 3 --skeleton fit.bvh fit.vgs -o no.rig
     must_fail 2 vg-fitmap --bones 0 fit.vgs -o no.rig
