@@ -1,11 +1,11 @@
 /* fit.c: deforms one polygon surface until it lies on another, from ties (markers, seeds) and nearest points.
  *
- * The fit minimises how much the deformation changes from place to place. With L a graph Laplacian of the source, s
- * its rest positions, and R_v the rotation and mean stretch of the faces around vertex v in the current fit, the
- * objective is
+ * The fit minimises how much the deformation changes from place to place. With L a graph Laplacian of the source whose
+ * springs are as strong as they are short, s its rest positions, and R_v the rotation and mean stretch of the faces
+ * around vertex v in the current fit, the objective is
  *
  *     sum over v of |(L x)_v - R_v (L s)_v|^2 / L_vv                     bending
- *       + a * sum over edges of |(x_u - x_v) - R_uv (s_u - s_v)|^2        stretching
+ *       + a * sum over springs of |(x_u - x_v) - R_uv (s_u - s_v)|^2      stretching
  *       + sum of weight * |point of the source - its target|^2           ties, nearest points in both directions
  *
  * A similarity of the whole body costs nothing, and one that changes slowly from limb to limb costs little. Sumner

@@ -42,7 +42,7 @@ static int gather_springs(vgi_edges *l, const vgi_fitting *in, vg_err *e)
     return r;
 }
 
-/* A spring is as strong as it is short, relative to the mean: where points are dense the surface is not softer. */
+/* The strength of a spring is one over its length: otherwise the surface is softer where its vertices are dense. */
 static void divide_by_lengths(vgi_edges *l, const double *rest)
 {
     double sum = 0, weight = 0;
