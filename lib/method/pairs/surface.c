@@ -546,34 +546,50 @@ static bool may_fit(const struct box *b, const struct query *q)
     return vgi_dot(b->axis, q->normal) >= q->cosine * b->cosine - q->sine * b->sine;
 }
 
-/* The least measure of at most `best`. The distance to a box is a lower bound of it. */
+/* A lower bound of the measure in a box at this squared distance: its normals, also mixed, lie in its cone. */
+static double least_measure(const struct box *b, const struct query *q, double square)
+{
+    if (b->cosine < 0) return square;
+    double cosine = vgi_dot(b->axis, q->normal);
+    if (cosine >= b->cosine) return square;
+    double sine = sqrt(fmax(0, 1 - cosine * cosine));
+    double beyond = sine * b->cosine - cosine * b->sine; /* sine of the angle beyond the cone */
+    if (cosine * b->cosine + sine * b->sine < 0) beyond = 1;
+    return square + q->reach * q->reach * beyond * beyond * (1 - 1e-12);
+}
+
+/* The least measure of at most `best`, nearest box first. */
 static bool search(const vgi_surface *s, const struct query *q, double best, vgi_hit *hit)
 {
     struct place {
         uint64_t node;
         int depth;
-        double square;
+        double measure; /* of no point in it is it less */
     } stack[DEEPEST + 2];
     int top = 0;
     hit->face = UINT32_MAX;
-    if (s->n) stack[top++] = (struct place){1, 0, box_distance(&s->box[1], q->p)};
+    if (s->n) stack[top++] = (struct place){1, 0, 0};
     while (top > 0) {
-        struct place at = stack[--top];
-        if (at.square > best || at.square > q->limit) continue;
+        struct place at = stack[--top], child[2];
+        if (at.measure > best) continue;
         if (at.depth == s->depth) {
             size_t begin, end;
             node_range(s->n, at.node, at.depth, &begin, &end);
             try_leaf(s, begin, end, q, &best, hit);
             continue;
         }
-        struct place near = {2 * at.node, at.depth + 1, box_distance(&s->box[2 * at.node], q->p)};
-        struct place far = {2 * at.node + 1, at.depth + 1, box_distance(&s->box[2 * at.node + 1], q->p)};
-        if (far.square < near.square) {
-            struct place swap = near;
-            near = far, far = swap;
+        for (unsigned i = 0; i < 2; i++) {
+            const struct box *b = &s->box[2 * at.node + i];
+            double square = box_distance(b, q->p);
+            bool possible = square <= best && square <= q->limit && may_fit(b, q);
+            if (possible && q->reach > 0) square = least_measure(b, q, square);
+            child[i] = (struct place){2 * at.node + i, at.depth + 1, possible ? square : INFINITY};
         }
-        if (far.square <= best && may_fit(&s->box[far.node], q)) stack[top++] = far;
-        if (near.square <= best && may_fit(&s->box[near.node], q)) stack[top++] = near;
+        bool swap = child[1].measure < child[0].measure;
+        for (unsigned i = 0; i < 2; i++) { /* the nearer one last: it comes first */
+            const struct place *c = &child[(i == 0) != swap];
+            if (c->measure <= best && c->measure < INFINITY) stack[top++] = *c;
+        }
     }
     return hit->face != UINT32_MAX;
 }
