@@ -382,8 +382,10 @@ static void find_near(void *context, size_t block)
             most = (known + t->reach * t->reach * vgi_square(normal, t->goal_normal + 3 * v)) * (1 + 1e-9);
         t->distance[v] = INFINITY;
         if (!(t->L.sum[v] > 0) || (t->in->take_vertex && !t->in->take_vertex[v])) continue;
-        bool found = most < INFINITY && vgi_surface_alike(t->in->target, at, normal, COSINE, t->reach, limit, most, &hit);
-        if (!found && !vgi_surface_alike(t->in->target, at, normal, COSINE, t->reach, limit, INFINITY, &hit)) continue;
+        bool found =
+            most < INFINITY && vgi_surface_alike(t->in->target, at, normal, COSINE, t->reach, limit, most, &hit);
+        if (!found && !vgi_surface_alike(t->in->target, at, normal, COSINE, t->reach, limit, INFINITY, &hit))
+            continue;
         if (hit.border && !t->border[v]) continue;
         t->distance[v] = sqrt(hit.square);
         memcpy(t->goal + 3 * v, hit.point, sizeof hit.point);
@@ -402,7 +404,9 @@ static void find_reverse(void *context, size_t block)
         double sign = t->in->flipped ? -1 : 1, normal[3] = {sign * n[0], sign * n[1], sign * n[2]};
         vgi_hit hit;
         p->weight = 0;
-        if (!vgi_surface_alike(t->now, at, normal, COSINE, t->reach, t->limit * t->limit, INFINITY, &hit) || hit.border) continue;
+        if (!vgi_surface_alike(t->now, at, normal, COSINE, t->reach, t->limit * t->limit, INFINITY, &hit) ||
+            hit.border)
+            continue;
         size_t begin = t->m->start[hit.face], r = t->m->start[hit.face + 1] - begin, first = hit.corner - begin;
         if (r < 3 || r > VGI_SMALL_FACE) continue;
         *p = (reverse){.face = hit.face, .weight = 1 - hit.square / (t->limit * t->limit)};
@@ -545,8 +549,7 @@ static int prepare_fit(fit *t, vg_err *e)
     if (r == VG_OK) r = measure_reach(t, e);
     if (r == VG_OK) r = vgi_smoothness_make(&t->smooth, &t->L, e);
     if (r == VG_OK) r = vgi_cholesky_new(&t->solver, &t->smooth.matrix, NULL, e);
-    double **points[] = {&t->laplacian, &t->x, &t->rhs, &t->normal, &t->tmp, &t->goal,
-                         &t->goal_normal};
+    double **points[] = {&t->laplacian, &t->x, &t->rhs, &t->normal, &t->tmp, &t->goal, &t->goal_normal};
     for (size_t i = 0; i < sizeof points / sizeof *points; i++)
         if (!(*points[i] = vgi_array(nv, 3 * sizeof(double), e))) return VG_ENOMEM;
     t->inverse = vgi_array(nf, 9 * sizeof(double), e);
@@ -577,9 +580,8 @@ static int prepare_fit(fit *t, vg_err *e)
 
 static void clear_fit(fit *t)
 {
-    double *arrays[] = {t->laplacian, t->inverse, t->h_normal, t->area, t->trust, t->face_map,
-                        t->map, t->x, t->rhs, t->normal, t->tmp, t->pull, t->goal,
-                        t->goal_normal, t->distance};
+    double *arrays[] = {t->laplacian, t->inverse, t->h_normal, t->area, t->trust, t->face_map,    t->map,     t->x,
+                        t->rhs,       t->normal,  t->tmp,      t->pull, t->goal,  t->goal_normal, t->distance};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     vgi_laplacian_clear(&t->L);
     vgi_smoothness_clear(&t->smooth);

@@ -13,7 +13,7 @@
 enum { BLOCK = 256 };
 static const double FAR = 0.03;   /* in D: the largest distance of a vertex from its place, as of paired faces */
 static const double OWN_SIZE = 1.25; /* sizes that differ by less may be those of two people, measured in one unit */
-static const double COPY = 1e-3;  /* of D: both are one shape, in two sizes */
+static const double COPY = 1e-3;     /* of D: both are one shape, in two sizes */
 static const double COSINE = 0.5; /* least cosine of the angle between normals that match */
 
 typedef struct search {
@@ -96,8 +96,8 @@ static void share_face(const vg_mesh *source, size_t f, double *share)
     for (uint32_t c = source->start[f]; c < source->start[f + 1]; c++) share[source->vert[c]] += part;
 }
 
-int vgi_places_share(const vgi_place *places, const vg_mesh *source, const vg_correspondence *pairs, const vg_mesh *target,
-                     double *share, vg_err *e)
+int vgi_places_share(const vgi_place *places, const vg_mesh *source, const vg_correspondence *pairs,
+                     const vg_mesh *target, double *share, vg_err *e)
 {
     bool *done = vgi_array(target->nv, sizeof *done, e);
     if (!done) return VG_ENOMEM;
@@ -117,8 +117,8 @@ int vgi_places_share(const vgi_place *places, const vg_mesh *source, const vg_co
     return VG_OK;
 }
 
-double vgi_places_size(const vg_mesh *source, const double *reference, const vg_correspondence *pairs, const vg_mesh *target,
-                       const double *points)
+double vgi_places_size(const vg_mesh *source, const double *reference, const vg_correspondence *pairs,
+                       const vg_mesh *target, const double *points)
 {
     double sum[2][3] = {{0}}, square[2] = {0}, at[2][3];
     for (size_t f = 0; f < target->nf; f++) {
@@ -142,9 +142,10 @@ static size_t mean_of(const double *points, const bool *use, size_t n, double me
     return count;
 }
 
-/* The ratio of the sizes, both about their centroids; R: the rotation from one to the other; *miss: the distance that is left when they lie on one another, in
- * the root of the mean square, relative to the size. 0: there is none. */
-static double relative_size(const double *from, const double *to, const bool *use, size_t n, double R[9], double *miss)
+/* The ratio of the sizes, both about their centroids. R: the rotation from one to the other. *miss: the distance that is
+ * left when they lie on one another, in the root of the mean square, relative to the size. 0: there is none. */
+static double relative_size(const double *from, const double *to, const bool *use, size_t n, double R[9],
+                            double *miss)
 {
     double means[2][3], a = 0, b = 0, S[9] = {0}, q[4], left = 0;
     if (!mean_of(from, use, n, means[0]) || !mean_of(to, use, n, means[1])) return 0;

@@ -23,13 +23,13 @@ void vgi_place_point(const vg_mesh *source, const vgi_place *p, const double *po
 /* vgi_places_share: how much each source vertex counts in the centroid of what drives the target (nv of the source, their
  * sum is 1): each vertex of the target's faces has its place, or without one the centroid of a source face that drives it.
  * places NULL: none has. */
-int vgi_places_share(const vgi_place *places, const vg_mesh *source, const vg_correspondence *pairs, const vg_mesh *target,
-                     double *share, vg_err *e) VG_MUST_CHECK;
+int vgi_places_share(const vgi_place *places, const vg_mesh *source, const vg_correspondence *pairs,
+                     const vg_mesh *target, double *share, vg_err *e) VG_MUST_CHECK;
 
 /* vgi_places_size: the size of the target relative to what drives it: the root of the ratio of the mean squared distances of
  * paired faces from their centroids; 1 if there is none. */
-double vgi_places_size(const vg_mesh *source, const double *reference, const vg_correspondence *pairs, const vg_mesh *target,
-                       const double *points);
+double vgi_places_size(const vg_mesh *source, const double *reference, const vg_correspondence *pairs,
+                       const vg_mesh *target, const double *points);
 
 /* vgi_motion_size: how much larger motions of expressions are on n points `to` than on the points `from` that they
  * correspond to, over those to use; 1 if there are none. The ratio of the sizes, but of two people a power of ten. */

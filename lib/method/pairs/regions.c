@@ -10,8 +10,8 @@
 #include <stdlib.h>
 
 enum { CHUNK = 64, ROUNDS = 24, LAST = 3 }; /* of the median; the last ones sharpen it */
-static const double CELL = 0.04;   /* in D: largest distance of a face from the centre of its cell */
-static const double REACH = 0.1;   /* in D: radius of a neighbourhood */
+static const double CELL = 0.04;            /* in D: largest distance of a face from the centre of its cell */
+static const double REACH = 0.1;            /* in D: radius of a neighbourhood */
 /* Cosines of the angles up to which an offset does not turn with the neighbourhood of its face, and from which it does:
  * 12 and 22 degrees; and beyond that with the face: 45 and 75. */
 static const double AROUND_STAYS = 0.978, AROUND_TURNS = 0.927, STAYS = 0.707, TURNS = 0.259;
@@ -47,9 +47,9 @@ struct vgi_regions {
     double *large;        /* per face: how far its neighbourhood is large enough to be a limb, from 0 to 1 */
     uint32_t *first;      /* nf + 1: of each face in `parts` */
     part *parts;
-    vgi_map *sum, *turn;  /* per cell, in eight poses: sum of the maps by area, and its rotation */
-    vgi_lanes *weight;    /* per cell: area of the faces that have a map */
-    vgi_map *whole;       /* the last one of `turn` */
+    vgi_map *sum, *turn; /* per cell, in eight poses: sum of the maps by area, and its rotation */
+    vgi_lanes *weight;   /* per cell: area of the faces that have a map */
+    vgi_map *whole;      /* the last one of `turn` */
     double spread[VGI_LANES], limbs[VGI_LANES];
 };
 
@@ -58,9 +58,9 @@ struct vgi_regions {
 typedef struct builder {
     const vg_mesh *mesh;
     vgi_incidence around;
-    double *centre;                /* per face */
-    double *nearest;               /* per face: distance to the centre of its cell */
-    uint32_t *cell;                /* per face: UINT32_MAX until it has one */
+    double *centre;                    /* per face */
+    double *nearest;                   /* per face: distance to the centre of its cell */
+    uint32_t *cell;                    /* per face: UINT32_MAX until it has one */
     uint32_t *seen_face, *seen_vertex; /* the last cell whose flood came here, + 1 */
     uint32_t *queue;
     part *parts;
@@ -79,7 +79,8 @@ static int make_builder(builder *b, vgi_regions *r, const vg_mesh *m, const doub
     b->seen_vertex = vgi_array(m->nv, sizeof *b->seen_vertex, e);
     b->queue = vgi_array(m->nf, sizeof *b->queue, e);
     r->area = vgi_array(m->nf, sizeof *r->area, e);
-    if (!b->centre || !b->nearest || !b->cell || !b->seen_face || !b->seen_vertex || !b->queue || !r->area) return VG_ENOMEM;
+    if (!b->centre || !b->nearest || !b->cell || !b->seen_face || !b->seen_vertex || !b->queue || !r->area)
+        return VG_ENOMEM;
     for (size_t f = 0; f < m->nf; f++) {
         double area[3];
         vgi_face_centre(reference, m->vert + m->start[f], vgi_face_size(m, f), b->centre + 3 * f);
@@ -188,7 +189,8 @@ static int measure_size(vgi_regions *r, double D, vg_err *e)
             for (uint32_t i = r->first_face[k]; i < r->first_face[k + 1]; i++) area[k] += r->area[r->face[i]];
         for (size_t f = 0; f < r->nf; f++) {
             double sum = 0;
-            for (uint32_t p = r->first[f]; p < r->first[f + 1]; p++) sum += r->parts[p].weight * area[r->parts[p].cell];
+            for (uint32_t p = r->first[f]; p < r->first[f + 1]; p++)
+                sum += r->parts[p].weight * area[r->parts[p].cell];
             r->large[f] = smooth_step(sum / (D * D), SMALL, LARGE);
         }
     }

@@ -13,7 +13,7 @@ enum { CHUNK = 512 };
 
 struct vg_sums {
     const vg_graph *g;
-    size_t faces;   /* without links */
+    size_t faces; /* without links */
     int threads;
     double scale;   /* of motions */
     double *offset; /* per corner: the target's reference vector less the source's, scaled */
@@ -34,8 +34,10 @@ static int find_beside(vg_sums *s, vg_err *e)
     s->beside = vgi_array(2 * g->nlinks, sizeof *s->beside, e);
     if (face_of && s->beside) {
         for (size_t f = 0; f < s->faces; f++)
-            for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) face_of[g->faces.vert[c]] = (uint32_t)f;
-        for (size_t i = 0; i < 2 * g->nlinks; i++) s->beside[i] = face_of[g->faces.vert[g->faces.start[s->faces] + i]];
+            for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
+                face_of[g->faces.vert[c]] = (uint32_t)f;
+        for (size_t i = 0; i < 2 * g->nlinks; i++)
+            s->beside[i] = face_of[g->faces.vert[g->faces.start[s->faces] + i]];
     }
     bool done = face_of && s->beside;
     free(face_of);
@@ -142,7 +144,8 @@ static void turn_of(const vg_sums *s, size_t f, vgi_map *turn)
 }
 
 /* Corner i of face f: the source's vector now, and the offset, turned, mixed with what is there. */
-static void mix_corner(const sums_job *j, size_t lane, size_t corner, const double *vector, const vgi_map *turn, double share)
+static void mix_corner(const sums_job *j, size_t lane, size_t corner, const double *vector, const vgi_map *turn,
+                       double share)
 {
     const double *offset = j->s->offset + 3 * corner;
     double *to = j->out[lane] + 3 * corner;

@@ -495,7 +495,8 @@ static double alike_distance(const vgi_surface *s, const struct triangle *t, con
     double v = (c2 * pb - bc * pc) / det, w = (b2 * pc - bc * pb) / det;
     bool inside = det > 1e-24 * b2 * c2 && v >= 0 && w >= 0 && v + w <= 1;
     double on_bc = a2 > 0 ? clamp01((b2 - bc + pc - pb) / a2) : 0;
-    const double at[4][2] = {{v, w}, {b2 > 0 ? clamp01(pb / b2) : 0, 0}, {1 - on_bc, on_bc}, {0, c2 > 0 ? clamp01(pc / c2) : 0}};
+    const double at[4][2] = {
+        {v, w}, {b2 > 0 ? clamp01(pb / b2) : 0, 0}, {1 - on_bc, on_bc}, {0, c2 > 0 ? clamp01(pc / c2) : 0}};
     *touched = 0;
     for (int i = inside ? 0 : 1; i < (inside ? 1 : 4); i++) {
         double square = 0;
@@ -513,8 +514,8 @@ static double alike_distance(const vgi_surface *s, const struct triangle *t, con
 static void set_hit(const vgi_surface *s, const struct triangle *t, const struct query *q, const double u[2],
                     uint8_t touched, double measure, vgi_hit *hit)
 {
-    *hit = (vgi_hit){.face = t->face, .measure = measure, .border = touched & t->borders, .corner = t->corner,
-                     .u = {u[0], u[1]}};
+    *hit = (vgi_hit){
+        .face = t->face, .measure = measure, .border = touched & t->borders, .corner = t->corner, .u = {u[0], u[1]}};
     memcpy(hit->point, t->a, sizeof t->a);
     vgi_add_scaled(hit->point, u[0], t->ab), vgi_add_scaled(hit->point, u[1], t->ac);
     hit->square = measure;
@@ -525,13 +526,15 @@ static void set_hit(const vgi_surface *s, const struct triangle *t, const struct
     hit->square = vgi_square(q->p, hit->point);
 }
 
-static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const struct query *q, double *best, vgi_hit *hit)
+static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const struct query *q, double *best,
+                     vgi_hit *hit)
 {
     for (size_t i = begin; i < end; i++) {
         const struct triangle *t = &s->triangle[i];
         double u[2] = {0, 0};
         uint8_t touched;
-        double measure = q->reach > 0 ? alike_distance(s, t, q, u, &touched) : triangle_distance(t, q->p, u, &touched);
+        double measure =
+            q->reach > 0 ? alike_distance(s, t, q, u, &touched) : triangle_distance(t, q->p, u, &touched);
         if (!(measure <= *best) || (!(measure < *best) && t->face >= hit->face) || !normal_fits(s, t, u, q)) continue;
         vgi_hit found;
         set_hit(s, t, q, u, touched, measure, &found);

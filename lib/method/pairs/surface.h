@@ -53,5 +53,4 @@ bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *
 bool vgi_surface_alike(const vgi_surface *s, const double p[3], const double *normal, double cosine, double reach,
                        double limit, double most, vgi_hit *hit);
 
-
 #endif

@@ -447,7 +447,9 @@ static void follow_places(const transfer_job *j, size_t f, vgi_map *map)
     size_t begin = c->target->faces.start[f], r = c->target->faces.start[f + 1] - begin;
     bool some = false;
     for (size_t k = 0; k < j->lanes; k++) some |= c->gradient[k] > 0;
-    if (some) vgi_transfer_kernel_now()->follow(map, VGI_FOLLOW_GRADIENT, c->vectors + 3 * begin, r, j->out, 3 * begin, j->lanes);
+    if (some)
+        vgi_transfer_kernel_now()->follow(map, VGI_FOLLOW_GRADIENT, c->vectors + 3 * begin, r, j->out, 3 * begin,
+                                          j->lanes);
     if (c->regions) vgi_regions_turn(c->regions, c->pairs->source[c->pairs->first[f]], map, 0, map);
     else vgi_transfer_kernel_now()->polar(map, map);
     mix_places(j, f, map);
@@ -556,8 +558,8 @@ static int set_motion_size(vg_cross_transfer *c, const double *target, vg_err *e
     return VG_OK;
 }
 
-int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_reference, const double *fitted,
-                             bool mixed, vg_err *e)
+int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_reference, const double *fitted, bool mixed,
+                             vg_err *e)
 {
     const vg_graph *g = c->target;
     c->scale = vg_diagonal(fitted, c->source->nv) / vg_diagonal(c->source_reference, c->source->nv);

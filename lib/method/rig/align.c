@@ -14,7 +14,8 @@
 
 static const uint32_t NONE = UINT32_MAX;
 static const double APART = 8, ALIKE = 3;
-static const double STRANGERS = 20; /* APART for bones of unknown role, such as breasts and tails: bodies differ in them */
+/* APART for bones of unknown role, such as breasts and tails: bodies differ in them. */
+static const double STRANGERS = 20;
 static const double LONG = 0.1; /* a bone of unknown role counts as a limb if it is at least this long, relative to
                                  * the skeleton's diagonal */
 

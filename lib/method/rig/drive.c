@@ -15,13 +15,13 @@ struct vg_driver {
     const vg_skeleton *by;
     uint32_t *from;  /* per joint of the rig: the paired joint, or UINT32_MAX */
     bool *carried;   /* per joint of the rig: paired, with no paired joint above it */
-    uint32_t *lead;  /* per joint of the rig without a paired joint at or above it: the first carried joint below it */
+    uint32_t *lead; /* per joint of the rig without a paired joint at or above it: the first carried joint below it */
     double *before;  /* per joint of the rig: a rotation applied before the other's, 4 numbers */
     double *degrees; /* per joint of the rig: the angle of alignment */
     vgi_stance stance;
     double scale;
     size_t missing;
-    bool *lacks;     /* per joint of the rig: no joint of the skeleton drives this part of the body */
+    bool *lacks; /* per joint of the rig: no joint of the skeleton drives this part of the body */
     bool guessed;
     double *positions, *turns; /* of the joints of the rig */
 };
@@ -47,7 +47,8 @@ static double compare_sizes(const vg_driver *d, const vgi_rests *x)
 /* Parts of the body whose motion is missed, unlike that of fingers and of more joints in the spine. */
 static bool is_main_part(vgi_role r)
 {
-    return vgi_role_is_limb(r) || r.part == VGI_HIPS || r.part == VGI_HEAD || r.part == VGI_HAND || r.part == VGI_FOOT;
+    return vgi_role_is_limb(r) || r.part == VGI_HIPS || r.part == VGI_HEAD || r.part == VGI_HAND ||
+           r.part == VGI_FOOT;
 }
 
 static void find_lacks(vg_driver *d, const vgi_role *roles)
@@ -55,7 +56,8 @@ static void find_lacks(vg_driver *d, const vgi_role *roles)
     for (size_t j = 0; j < d->r->skeleton.njoints; j++) {
         d->lacks[j] = d->from[j] == NONE && d->r->skeleton.joints[j].nchannels && is_main_part(roles[j]);
         for (size_t k = 0; d->lacks[j] && k < d->r->skeleton.njoints; k++)
-            if (d->from[k] != NONE && roles[k].part == roles[j].part && roles[k].side == roles[j].side) d->lacks[j] = false;
+            if (d->from[k] != NONE && roles[k].part == roles[j].part && roles[k].side == roles[j].side)
+                d->lacks[j] = false;
     }
 }
 
@@ -105,7 +107,8 @@ static int pair_joints(vg_driver *d, const uint32_t *partner, vg_err *e)
     find_leads(d);
     if (found) return VG_OK;
     return vg_fail(e, VG_EINPUT,
-                   "no joint of the skeleton has the name of a bone of the rig, such as '%.80s', or a usual name for the same part "
+                   "no joint of the skeleton has the name of a bone of the rig, such as '%.80s', or a usual name for "
+                   "the same part "
                    "of the body, and its shape does not tell its arms, legs and toes: --joints pairs them by a file",
                    s->joints[d->r->bone[0]].name);
 }

@@ -8,13 +8,13 @@
 #include <stdlib.h>
 
 static const uint32_t NONE = UINT32_MAX;
-static const double EVEN = 0.05;    /* two limbs are a pair if their lengths differ by less than this, relative */
-static const double LIMB = 0.15;    /* least length of a limb, relative to the skeleton's diagonal */
-static const double HALVES = 0.5;   /* least ratio of the two long bones of a limb */
-static const double OUTER = 0.7;    /* how much shorter bones farther out may be and still be the limb */
-static const double WHOLE = 0.5;    /* least share of upper and lower limb in the way from its first joint to its end */
-static const double AHEAD = 0.3;    /* least horizontal part of a foot */
-static const double NECK = 1.5;     /* a bone this much longer than others above the arms is the head */
+static const double EVEN = 0.05;  /* two limbs are a pair if their lengths differ by less than this, relative */
+static const double LIMB = 0.15;  /* least length of a limb, relative to the skeleton's diagonal */
+static const double HALVES = 0.5; /* least ratio of the two long bones of a limb */
+static const double OUTER = 0.7;  /* how much shorter bones farther out may be and still be the limb */
+static const double WHOLE = 0.5;  /* least share of upper and lower limb in the way from its first joint to its end */
+static const double AHEAD = 0.3;  /* least horizontal part of a foot */
+static const double NECK = 1.5;   /* a bone this much longer than others above the arms is the head */
 
 enum { PATH = 24 };
 
@@ -88,7 +88,8 @@ static bool find_limbs(const shape *x, uint32_t from, limbs *to)
             limbs l = {.from = from, .side = {walk(x, a), walk(x, b)}};
             size_t other;
             if (fabs(la - lb) > EVEN * fmax(la, lb) || la < most || l.side[0].n != l.side[1].n) continue;
-            if (!divide_limb(x, &l.side[0], &l.upper) || !divide_limb(x, &l.side[1], &other) || other != l.upper) continue;
+            if (!divide_limb(x, &l.side[0], &l.upper) || !divide_limb(x, &l.side[1], &other) || other != l.upper)
+                continue;
             *to = l, most = la, found = true;
         }
     }
@@ -137,7 +138,8 @@ static int find_side(const shape *x, const limbs *legs, const limbs *arms)
     vgi_add_scaled(ahead, -vgi_dot(ahead, up), up);
     if (!(vgi_length(ahead) > AHEAD * all)) return 0;
     vgi_cross(up, ahead, left);
-    vgi_subtract(x->at + 3 * (size_t)legs->side[0].joint[legs->upper], x->at + 3 * (size_t)legs->side[1].joint[legs->upper], across);
+    vgi_subtract(x->at + 3 * (size_t)legs->side[0].joint[legs->upper],
+                 x->at + 3 * (size_t)legs->side[1].joint[legs->upper], across);
     return vgi_dot(across, left) > 0 ? 1 : -1;
 }
 
@@ -158,8 +160,10 @@ static void name_limbs(vgi_role *roles, const limbs *l, int first, vgi_part abov
 static int side_of_arms(const shape *x, const limbs *legs, const limbs *arms, int side)
 {
     double a[3], b[3];
-    vgi_subtract(x->at + 3 * (size_t)legs->side[0].joint[legs->upper], x->at + 3 * (size_t)legs->side[1].joint[legs->upper], a);
-    vgi_subtract(x->at + 3 * (size_t)arms->side[0].joint[arms->upper], x->at + 3 * (size_t)arms->side[1].joint[arms->upper], b);
+    vgi_subtract(x->at + 3 * (size_t)legs->side[0].joint[legs->upper],
+                 x->at + 3 * (size_t)legs->side[1].joint[legs->upper], a);
+    vgi_subtract(x->at + 3 * (size_t)arms->side[0].joint[arms->upper],
+                 x->at + 3 * (size_t)arms->side[1].joint[arms->upper], b);
     return vgi_dot(a, b) > 0 ? side : -side;
 }
 
@@ -168,7 +172,8 @@ static void name_head(const shape *x, vgi_role *roles, const limbs *arms)
 {
     uint32_t best = NONE;
     for (uint32_t j = arms->from + 1; j < x->s->njoints; j++) {
-        if (x->s->joints[j].parent != arms->from || j == arms->side[0].joint[0] || j == arms->side[1].joint[0]) continue;
+        if (x->s->joints[j].parent != arms->from || j == arms->side[0].joint[0] || j == arms->side[1].joint[0])
+            continue;
         if (best == NONE || x->reach[j] > x->reach[best]) best = j;
     }
     if (best == NONE) return;
@@ -187,7 +192,8 @@ static void name_head(const shape *x, vgi_role *roles, const limbs *arms)
 
 static void name_middle(const shape *x, vgi_role *roles, const limbs *legs, const limbs *arms)
 {
-    for (uint32_t j = arms->from; j != legs->from; j = x->s->joints[j].parent) roles[j] = (vgi_role){.part = VGI_SPINE};
+    for (uint32_t j = arms->from; j != legs->from; j = x->s->joints[j].parent)
+        roles[j] = (vgi_role){.part = VGI_SPINE};
     roles[legs->from] = (vgi_role){.part = VGI_HIPS};
     name_head(x, roles, arms);
 }

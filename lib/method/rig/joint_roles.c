@@ -129,7 +129,8 @@ static void decide_side(const body_side *x, const double *at)
 /* The last joint that is above both thighs. */
 static uint32_t find_between_thighs(const vg_skeleton *s, vgi_role *roles)
 {
-    uint32_t left = find_from(&(body_side){s, roles, 1}, VGI_THIGH, 0), right = find_from(&(body_side){s, roles, -1}, VGI_THIGH, 0);
+    uint32_t left = find_from(&(body_side){s, roles, 1}, VGI_THIGH, 0),
+             right = find_from(&(body_side){s, roles, -1}, VGI_THIGH, 0);
     while (left != NONE && right != NONE && !is_above(s, left, right)) left = s->joints[left].parent;
     return right == NONE ? NONE : left;
 }

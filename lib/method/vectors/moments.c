@@ -80,7 +80,8 @@ static void measure_face(const double *w, size_t r, double *p, double *q, unsign
 int vgi_mesh_moments(const vg_mesh *m, const double *reference, double *p, double *q, unsigned char *slow, vg_err *e)
 {
     size_t most = 0;
-    for (size_t f = 0; f < m->nf; f++) most = m->start[f + 1] - m->start[f] > most ? m->start[f + 1] - m->start[f] : most;
+    for (size_t f = 0; f < m->nf; f++)
+        most = m->start[f + 1] - m->start[f] > most ? m->start[f + 1] - m->start[f] : most;
     double *w = vgi_array(3 * most, sizeof *w, e); /* the vectors of a face */
     if (!w) return VG_ENOMEM;
     for (size_t f = 0; f < m->nf; f++) {
