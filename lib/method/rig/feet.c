@@ -15,9 +15,8 @@ static const uint32_t NONE = UINT32_MAX;
 static const double SLOW = 0.15;    /* a joint stands below this share of its fast speed */
 static const double LOW = 0.12;     /* and below this height above its lowest position, relative to the length of the
                                      * leg */
-static const double RAISED =
-    0.15; /* a heel is on the ground at most this far above the ball, relative to their distance
-                                     * at rest */
+static const double RAISED = 0.15;  /* a heel is on the ground at most this far above the ball, relative to their
+                                     * distance at rest */
 static const double STRETCH = 0.999; /* largest distance from hip to foot, relative to the length of the leg */
 enum { SHORTEST = 3 };              /* fewest poses of a contact */
 
