@@ -108,16 +108,6 @@ static void print_help(const cli_program *p)
     printf("\nProgress as lines of JSON, for other programs: --progress json[:DESCRIPTOR], see vg(7).\n");
 }
 
-/* strtod also accepts leading blanks, hexadecimal numbers and names. */
-const char *cli_scan_number(const char *text, double *x)
-{
-    char *end;
-    const size_t decimal = strspn(text, "+-.0123456789eE");
-    if (!decimal) return NULL;
-    *x = strtod(text, &end);
-    return end > text && end <= text + decimal && isfinite(*x) ? end : NULL;
-}
-
 static bool parse_number(const char *text, double *x)
 {
     const char *end = cli_scan_number(text, x);

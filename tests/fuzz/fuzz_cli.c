@@ -40,6 +40,7 @@ static int fuzz_close(int fd)
 #define atexit(f) ((void)(f), 0)
 #define printf(...) ((void)snprintf(NULL, 0, __VA_ARGS__))
 #include "../../cmd/cli.c"
+#include "../../cmd/decimal.c"
 #include "../../cmd/options.c"
 #include "../../cmd/output.c"
 #include "../../cmd/processors.c"

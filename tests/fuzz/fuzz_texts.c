@@ -61,6 +61,7 @@ void cli_stop(int why, const char *format, ...)
     longjmp(ended, 1);
 }
 
+#include "../../cmd/decimal.c"
 #define free let_go
 #include "../../cmd/lines.c"
 #include "../../cmd/signal_texts.c"
