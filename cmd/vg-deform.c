@@ -139,7 +139,7 @@ static void run_batch(work *w, size_t n, const double *const *in, double *const 
     case APPLY: vg_deformer_apply(w->deformer, n, in, out); break;
     case TRANSFER:
         vg_deformer_transfer(w->deformer, n, w->kind, in, out);
-        if (w->sums) vg_sums_mix(w->sums, n, in, out);
+        if (w->sums) vg_sums_mix(w->sums, n, w->kind, in, out);
         break;
     case CARRY: vg_cross_transfer_apply(w->carrier, n, in, out); break;
     case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
@@ -529,7 +529,7 @@ static void make_step(work *w)
             r = vg_deformer_target(w->deformer, vectors, method, &e);
         }
         free(vectors);
-        if (r == VG_OK && w->way == TRANSFER && w->by == BY_AUTO && w->kind == VG_VERTICES)
+        if (r == VG_OK && w->way == TRANSFER && w->by == BY_AUTO)
             r = vg_sums_new(&w->sums, w->from, w->source.body.reference, t->body.reference, cli_threads(), &e);
     }
     if (r < 0) cli_die(&e);

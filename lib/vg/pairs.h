@@ -104,8 +104,9 @@ int vg_sums_new(vg_sums **s, const vg_graph *g, const double *source_reference, 
 void vg_sums_free(vg_sums **s);
 /* vg_sums_size: how much larger motions are on the target. */
 double vg_sums_size(const vg_sums *s);
-/* vg_sums_mix: n poses of the source (vertices), and the target's wanted vectors by offset, which change in place. */
-void vg_sums_mix(vg_sums *s, size_t n, const double *const *poses, double *const *vectors);
+/* vg_sums_mix: n poses of the source, as VG_VERTICES or VG_VECTORS, and the target's wanted vectors by offset, which change
+ * in place. */
+void vg_sums_mix(vg_sums *s, size_t n, vg_kind kind, const double *const *poses, double *const *vectors);
 
 /* Transfer that is exact at a few sculpted poses (MATH 11; after the example-based transfer of Cashman and Hormann
  * 2012, 4.3, as a correction of plain transfer): the error of plain transfer in the examples is subtracted in

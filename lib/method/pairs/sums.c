@@ -20,6 +20,7 @@ struct vg_sums {
     double *p, *q;  /* see vgi_source */
     unsigned char *slow, *bad;
     uint32_t *beside; /* per link: a face at each end */
+    uint32_t *own;    /* per corner: itself, in place of its vertex where poses are vectors */
     vgi_map *maps;
     vgi_regions *regions;
 };
@@ -52,7 +53,9 @@ static int make_arrays(vg_sums *s, vg_err *e)
     s->q = vgi_array(3 * s->faces, sizeof *s->q, e);
     s->slow = vgi_array(s->faces, 1, e);
     s->bad = vgi_array(s->faces, 1, e);
-    if (!s->offset || !s->p || !s->q || !s->slow || !s->bad) return VG_ENOMEM;
+    s->own = vgi_array(corners, sizeof *s->own, e);
+    if (!s->offset || !s->p || !s->q || !s->slow || !s->bad || !s->own) return VG_ENOMEM;
+    for (size_t c = 0; c < corners; c++) s->own[c] = (uint32_t)c;
     s->maps = aligned_alloc(sizeof(vgi_lanes), (s->faces + 1) * sizeof *s->maps);
     if (s->maps) return VG_OK;
     return vg_fail(e, VG_ENOMEM, "not enough memory for a transfer of %zu faces", s->faces);
@@ -95,6 +98,7 @@ void vg_sums_free(vg_sums **s)
     free((*s)->slow);
     free((*s)->bad);
     free((*s)->beside);
+    free((*s)->own);
     free((*s)->maps);
     vgi_regions_free(&(*s)->regions);
     free(*s);
@@ -110,6 +114,7 @@ double vg_sums_size(const vg_sums *s)
 
 typedef struct sums_job {
     vg_sums *s;
+    const uint32_t *vert; /* per corner: its point in the poses */
     const double *poses[VGI_LANES];
     double *const *out;
     size_t lanes;
@@ -120,7 +125,7 @@ static void measure_chunk(void *context, size_t i)
     const sums_job *j = context;
     vg_sums *s = j->s;
     size_t first = i * CHUNK, last = first + CHUNK < s->faces ? first + CHUNK : s->faces;
-    const vgi_source source = {s->g->faces.start, s->g->faces.vert, s->p, s->q, s->slow, j->poses};
+    const vgi_source source = {s->g->faces.start, j->vert, s->p, s->q, s->slow, j->poses};
     vgi_transfer_kernel_now()->measure(&source, first, last, s->maps, s->bad);
     for (size_t f = first; f < last; f++)
         if (s->slow[f]) s->bad[f] = 0xff;
@@ -168,9 +173,9 @@ static void mix_face(const sums_job *j, size_t f)
     for (size_t lane = 0; lane < j->lanes; lane++) {
         double centre[3], vector[3];
         if (limbs[lane] >= 1) continue;
-        vgi_face_centre(j->poses[lane], m->vert + begin, r, centre);
+        vgi_face_centre(j->poses[lane], j->vert + begin, r, centre);
         for (size_t c = begin; c < begin + r; c++) {
-            vgi_subtract(j->poses[lane] + 3 * (size_t)m->vert[c], centre, vector);
+            vgi_subtract(j->poses[lane] + 3 * (size_t)j->vert[c], centre, vector);
             mix_corner(j, lane, c, vector, &turn, limbs[lane]);
         }
     }
@@ -183,10 +188,11 @@ static void mix_chunk(void *context, size_t i)
     for (size_t f = first; f < last; f++) mix_face(j, f);
 }
 
-void vg_sums_mix(vg_sums *s, size_t n, const double *const *poses, double *const *vectors)
+void vg_sums_mix(vg_sums *s, size_t n, vg_kind kind, const double *const *poses, double *const *vectors)
 {
+    const uint32_t *vert = kind == VG_VERTICES ? s->g->faces.vert : s->own;
     for (size_t p = 0; p < n; p += VGI_LANES) {
-        sums_job j = {.s = s, .out = vectors + p, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
+        sums_job j = {.s = s, .vert = vert, .out = vectors + p, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
         bool some = false;
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(s->threads, (s->faces + CHUNK - 1) / CHUNK, measure_chunk, &j);
