@@ -4,16 +4,12 @@
 #include "method/pairs/places.h"
 #include "method/pairs/surface.h"
 #include "numeric/face.h"
-#include "numeric/polar.h"
 #include "numeric/vec3.h"
-#include "vg.h"
 
 #include <stdlib.h>
 
 enum { BLOCK = 256 };
 static const double FAR = 0.03;   /* in D: the largest distance of a vertex from its place, as of paired faces */
-static const double OWN_SIZE = 1.25; /* sizes that differ by less may be those of two people, measured in one unit */
-static const double COPY = 1e-3;     /* of D: both are one shape, in two sizes */
 static const double COSINE = 0.5; /* least cosine of the angle between normals that match */
 
 typedef struct search {
@@ -129,56 +125,4 @@ double vgi_places_size(const vg_mesh *source, const double *reference, const vg_
     }
     for (size_t k = 0; k < 2 && target->nf; k++) square[k] -= vgi_dot(sum[k], sum[k]) / (double)target->nf;
     return square[0] > 0 && square[1] > 0 ? sqrt(square[0] / square[1]) : 1;
-}
-
-/* The mean of the points to use, of all if `use` is NULL. Returns how many there are. */
-static size_t mean_of(const double *points, const bool *use, size_t n, double mean[3])
-{
-    size_t count = 0;
-    mean[0] = mean[1] = mean[2] = 0;
-    for (size_t v = 0; v < n; v++)
-        if (!use || use[v]) vgi_add(mean, points + 3 * v), count++;
-    if (count) vgi_divide(mean, (double)count);
-    return count;
-}
-
-/* The ratio of the sizes, both about their centroids. R: the rotation from one to the other. *miss: the distance that is
- * left when they lie on one another, in the root of the mean square, relative to the size. 0: there is none. */
-static double relative_size(const double *from, const double *to, const bool *use, size_t n, double R[9],
-                            double *miss)
-{
-    double means[2][3], a = 0, b = 0, S[9] = {0}, q[4], left = 0;
-    if (!mean_of(from, use, n, means[0]) || !mean_of(to, use, n, means[1])) return 0;
-    for (size_t v = 0; v < n; v++) {
-        double x[3], y[3];
-        if (use && !use[v]) continue;
-        vgi_subtract(from + 3 * v, means[0], x), vgi_subtract(to + 3 * v, means[1], y);
-        a += vgi_dot(x, x), b += vgi_dot(y, y);
-        vgi_add_outer(S, 1, y, x);
-    }
-    if (!(a > 0) || !(b > 0)) return 0;
-    vgi_best_turn(S, q);
-    vg_quat_matrix(q, R);
-    for (int k = 0; k < 9; k++) left += S[k] * R[k];
-    *miss = sqrt(fmax(2 - 2 * left / sqrt(a * b), 0)); /* of both, at unit size */
-    return sqrt(b / a);
-}
-
-/* Heads of people differ by a tenth, but a lid or a lip moves as far on both (MATH 5): sizes that are near a power of ten
- * are those of a unit, unless the shapes are the same. */
-double vgi_motion_size(const double *from, const double *to, const bool *use, size_t n)
-{
-    double miss = 0, turn[9], size = relative_size(from, to, use, n, turn, &miss);
-    if (!(size > 0)) return 1;
-    double unit = pow(10, round(log10(size)));
-    bool people = miss > COPY && size < OWN_SIZE * unit && size * OWN_SIZE > unit;
-    return people ? unit : size;
-}
-
-double vg_points_turn(const double *from, const double *to, size_t n, double turn[9], double *miss)
-{
-    for (int i = 0; i < 9; i++) turn[i] = i % 4 == 0;
-    *miss = 1;
-    if (!(relative_size(from, to, NULL, n, turn, miss) > 0)) return 0;
-    return 180 / M_PI * acos(fmax(-1, fmin((turn[0] + turn[4] + turn[8] - 1) / 2, 1)));
 }

@@ -31,8 +31,4 @@ int vgi_places_share(const vgi_place *places, const vg_mesh *source, const vg_co
 double vgi_places_size(const vg_mesh *source, const double *reference, const vg_correspondence *pairs,
                        const vg_mesh *target, const double *points);
 
-/* vgi_motion_size: how much larger motions of expressions are on n points `to` than on the points `from` that they
- * correspond to, over those to use; 1 if there are none. The ratio of the sizes, but of two people a power of ten. */
-double vgi_motion_size(const double *from, const double *to, const bool *use, size_t n);
-
 #endif

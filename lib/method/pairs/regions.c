@@ -105,14 +105,9 @@ static void clear_builder(builder *b)
 
 static int add_part(builder *b, part p, vg_err *e)
 {
-    if (b->n == b->room) {
-        size_t room = 2 * b->room + 4096;
-        part *more = realloc(b->parts, room * sizeof *more);
-        if (!more) return vg_fail(e, VG_ENOMEM, "not enough memory for the neighbourhoods of %zu faces", b->mesh->nf);
-        b->parts = more, b->room = room;
-    }
-    b->parts[b->n++] = p;
-    return VG_OK;
+    int r = vgi_grow(&b->parts, &b->room, b->n + 1, sizeof *b->parts, e);
+    if (r == VG_OK) b->parts[b->n++] = p;
+    return r;
 }
 
 /* Face f, at distance d from the centre of a new cell: does it belong there? */

@@ -2,6 +2,7 @@
  * common frame, rejection of inconsistent pairs, the fit (fit.c), the pairing (pair.c). Files are read elsewhere.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/register.h"
+#include "method/pairs/similarity.h"
 #include "numeric/vec3.h"
 #include "numeric/kdtree.h"
 #include "numeric/stats.h"
@@ -15,10 +16,6 @@ enum { NEIGHBOURS = 4, ROBUST_ROUNDS = 20 };
  * one, and at least this far in D. */
 static const double WRONG_TIMES = 5, WRONG_FAR = 0.08;
 
-struct similarity {
-    double scale, rotation[9], shift[3]; /* x -> scale R x + shift */
-};
-
 struct registration {
     const vg_register_input *in;
     vg_register_result *out;
@@ -27,7 +24,7 @@ struct registration {
     double *rest;               /* the similarity that aligns source and target */
     vgi_tie *tie;
     size_t nties, nmarkers;     /* the first ones are the markers */
-    struct similarity s;
+    vgi_similarity s;
     vgi_surface *source_surface, *target_surface, *fitted_surface;
     uint32_t *links;
     size_t nlinks;
@@ -38,35 +35,6 @@ struct registration {
 };
 
 /* ---- the similarity ---- */
-
-/* Least squares (Horn 1987) for n weighted pairs of points. The scale is symmetric in both sides. */
-static void fit_similarity(struct similarity *s, const double *from, const double *to, const double *weight, size_t n)
-{
-    double sum = 0, a[3] = {0}, b[3] = {0}, S[9] = {0}, aa = 0, bb = 0;
-    for (size_t i = 0; i < n; i++) {
-        sum += weight[i];
-        vgi_add_scaled(a, weight[i], from + 3 * i), vgi_add_scaled(b, weight[i], to + 3 * i);
-    }
-    vgi_divide(a, sum), vgi_divide(b, sum);
-    for (size_t i = 0; i < n; i++) {
-        double x[3], y[3];
-        vgi_subtract(from + 3 * i, a, x), vgi_subtract(to + 3 * i, b, y);
-        for (size_t k = 0; k < 3; k++) aa += weight[i] * x[k] * x[k], bb += weight[i] * y[k] * y[k];
-        vgi_add_outer(S, weight[i], y, x);
-    }
-    double q[4], turned[3];
-    vgi_best_turn(S, q);
-    vg_quat_matrix(q, s->rotation);
-    s->scale = sqrt(bb / aa);
-    vgi_multiply_vector(s->rotation, a, turned);
-    memcpy(s->shift, b, sizeof s->shift), vgi_add_scaled(s->shift, -s->scale, turned);
-}
-
-static void apply_similarity(const struct similarity *s, const double x[3], double y[3])
-{
-    vgi_multiply_vector(s->rotation, x, y);
-    vgi_scale(y, s->scale), vgi_add(y, s->shift);
-}
 
 /* False if the points coincide or lie on one line: the covariance needs a second non-zero eigenvalue. */
 static bool spread_out(const double *x, size_t n)
@@ -83,17 +51,17 @@ static bool spread_out(const double *x, size_t n)
 }
 
 /* Reweight pairs: the weight decreases for residuals much larger than most (Geman and McClure). */
-static int robust_similarity(struct similarity *s, const double *from, const double *to, size_t n, vg_err *e)
+static int robust_similarity(vgi_similarity *s, const double *from, const double *to, size_t n, vg_err *e)
 {
     double *weight = vgi_array(n, sizeof *weight, e), *miss = vgi_array(n, sizeof *miss, e),
            *room = vgi_array(n, sizeof *room, e);
     if (!weight || !miss || !room) return free(weight), free(miss), free(room), VG_ENOMEM;
     for (size_t i = 0; i < n; i++) weight[i] = 1;
     for (int round = 0; round < ROBUST_ROUNDS; round++) {
-        fit_similarity(s, from, to, weight, n);
+        vgi_similarity_fit(s, from, to, weight, n);
         for (size_t i = 0; i < n; i++) {
             double y[3];
-            apply_similarity(s, from + 3 * i, y);
+            vgi_similarity_apply(s, from + 3 * i, y);
             miss[i] = sqrt(vgi_square(y, to + 3 * i));
         }
         double c = 3 * vgi_median(memcpy(room, miss, n * sizeof *room), n) + 1e-12;
@@ -322,7 +290,7 @@ static int normalise(struct registration *g, vg_err *e)
 
 static int align_meshes(struct registration *g, vg_err *e)
 {
-    g->s = (struct similarity){1, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+    g->s = (vgi_similarity){1, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
     int r = VG_OK;
     if (!g->in->aligned) {
         double *from = vgi_array(g->nties, 3 * sizeof *from, e), *to = vgi_array(g->nties, 3 * sizeof *to, e);
@@ -340,7 +308,7 @@ static int align_meshes(struct registration *g, vg_err *e)
         free(to);
     }
     for (size_t v = 0; v < g->in->source->nv && r == VG_OK; v++)
-        apply_similarity(&g->s, g->source + 3 * v, g->rest + 3 * v);
+        vgi_similarity_apply(&g->s, g->source + 3 * v, g->rest + 3 * v);
     return r;
 }
 

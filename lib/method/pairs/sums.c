@@ -2,8 +2,8 @@
  * source's motion is added in its own size (MATH 5). Poses whose parts turn far stay as they were transferred.
  * Targets of other faces are in transfer.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/pairs/places.h"
 #include "method/pairs/regions.h"
+#include "method/pairs/similarity.h"
 #include "method/vectors/moments.h"
 #include "numeric/face.h"
 
@@ -66,9 +66,11 @@ static int measure_references(vg_sums *s, const double *source, const double *ta
     const vg_graph *g = s->g;
     const vg_mesh m = {g->faces.nv, s->faces, g->faces.start, g->faces.vert};
     size_t n = 3 * vg_graph_corners(g);
-    double *from = vgi_array_raw(n, sizeof *from, e);
-    if (!from) return VG_ENOMEM;
-    s->scale = vgi_motion_size(source, target, g->in_face, g->faces.nv);
+    double *from = vgi_array_raw(n, sizeof *from, e), *weight = vgi_array(g->faces.nv, sizeof *weight, e);
+    if (!from || !weight) return free(from), free(weight), VG_ENOMEM;
+    for (size_t v = 0; v < g->faces.nv; v++) weight[v] = g->in_face[v];
+    s->scale = vgi_motion_size(source, target, weight, g->faces.nv);
+    free(weight);
     vg_graph_vectors(g, source, from);
     vg_graph_vectors(g, target, s->offset);
     for (size_t i = 0; i < n; i++) s->offset[i] -= s->scale * from[i];

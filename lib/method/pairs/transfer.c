@@ -6,6 +6,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/places.h"
 #include "method/pairs/regions.h"
+#include "method/pairs/similarity.h"
 #include "method/pairs/transfer_kernel.h"
 #include "numeric/face.h"
 #include "numeric/polar.h"
@@ -550,11 +551,11 @@ static bool place_face(vg_cross_transfer *c, size_t f)
 static int set_motion_size(vg_cross_transfer *c, const double *target, vg_err *e)
 {
     size_t nv = c->target->faces.nv;
-    bool *use = vgi_array(nv, sizeof *use, e);
-    if (!use) return VG_ENOMEM;
-    for (size_t v = 0; v < nv; v++) use[v] = c->place[v].face != UINT32_MAX;
-    c->scale = vgi_motion_size(c->points[0], target, use, nv);
-    free(use);
+    double *weight = vgi_array(nv, sizeof *weight, e);
+    if (!weight) return VG_ENOMEM;
+    for (size_t v = 0; v < nv; v++) weight[v] = c->place[v].face != UINT32_MAX;
+    c->scale = vgi_motion_size(c->points[0], target, weight, nv);
+    free(weight);
     return VG_OK;
 }
 
