@@ -195,8 +195,13 @@ static void fill_body(const work *w, vg_frame *f)
 {
     vg_err e;
     double *anchors;
-    if (w->kind != VG_VERTICES || w->way == RIDE || w->way == JOINTS) return;
-    turn_points(w, f->values, w->from->faces.nv);
+    if (w->kind == VG_DEFORMATIONS || w->way == RIDE || w->way == JOINTS) return;
+    turn_points(w, f->values, w->kind == VG_VERTICES ? w->from->faces.nv : vg_graph_corners(w->from));
+    if (w->kind == VG_VECTORS) {
+        turn_points(w, f->root, 1);
+        turn_points(w, vg_frame_anchors(f), w->h->nanchors);
+        return;
+    }
     if (w->carrier) vg_cross_transfer_root(w->carrier, f->values, f->root);
     else vg_graph_root(w->from, f->values, f->root);
     if (vg_frame_make_anchors(f, w->h->nanchors, &anchors, &e) < 0) cli_die(&e);
@@ -358,7 +363,7 @@ static void turn_source(work *w)
     static const double alike = 0.35;
     const double *to = opts.correspondence ? w->fitted : w->target.body.reference;
     double miss, angle;
-    if (!opts.onto || !to || w->kind != VG_VERTICES || w->by == BY_SHAPE) return;
+    if (!opts.onto || !to || w->kind == VG_DEFORMATIONS || w->by == BY_SHAPE) return;
     angle = vg_points_turn(w->h->body.reference, to, w->h->body.mesh.nv, w->turn, &miss);
     w->turned = angle > LEAST && miss < alike;
     if (!w->turned) return;

@@ -96,6 +96,9 @@ differ() {
     must_fail 0 vg-deform --onto z-up.obj horse.vgs -o out.vgs
     says "is turned by about 90 degrees against the reference pose 'horse.rest': the motion is turned with it"
     must vg-deform -q --onto z-up.obj horse.vgs -o out.vgs
+    pipe "vg-deform -q --onto z-up.obj horse.vgs | vg-solve >by-vertices.vgs"
+    pipe "vg-encode --vectors horse.vgs | vg-deform -q --onto z-up.obj | vg-solve >by-vectors.vgs"
+    must vg-diff -t 1e-9 by-vertices.vgs by-vectors.vgs
     must vg-deform horse.vgs -o measured.vgs
     must_fail 0 vg-deform --onto z-up.obj measured.vgs -o out.vgs
     says "differ by 90 degrees"
