@@ -2,7 +2,7 @@
  * source's motion is added in its own size (MATH 5). Poses whose parts turn far stay as they were transferred.
  * Targets of other faces are in transfer.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/pairs/regions.h"
+#include "method/pairs/limbs.h"
 #include "method/pairs/similarity.h"
 #include "method/vectors/moments.h"
 #include "numeric/face.h"
@@ -22,7 +22,7 @@ struct vg_sums {
     uint32_t *beside; /* per link: a face at each end */
     uint32_t *own;    /* per corner: itself, in place of its vertex where poses are vectors */
     vgi_map *maps;
-    vgi_regions *regions;
+    vgi_limbs *limbs;
 };
 
 /* ---- construction ---- */
@@ -76,7 +76,7 @@ static int measure_references(vg_sums *s, const double *source, const double *ta
     for (size_t i = 0; i < n; i++) s->offset[i] -= s->scale * from[i];
     free(from);
     int r = vgi_mesh_moments(&m, source, s->p, s->q, s->slow, e);
-    return r < 0 ? r : vgi_regions_new(&s->regions, &m, source, e);
+    return r < 0 ? r : vgi_limbs_new(&s->limbs, &m, source, e);
 }
 
 int vg_sums_new(vg_sums **out, const vg_graph *g, const double *source, const double *target, int threads, vg_err *e)
@@ -102,7 +102,7 @@ void vg_sums_free(vg_sums **s)
     free((*s)->beside);
     free((*s)->own);
     free((*s)->maps);
-    vgi_regions_free(&(*s)->regions);
+    vgi_limbs_free(&(*s)->limbs);
     free(*s);
     *s = NULL;
 }
@@ -140,14 +140,14 @@ static void turn_of(const vg_sums *s, size_t f, vgi_map *turn)
     if (f >= s->faces) { /* the mean of both ends */
         const uint32_t *end = s->beside + 2 * (f - s->faces);
         vgi_map other;
-        vgi_regions_turn(s->regions, end[0], NULL, 0xff, &map);
-        vgi_regions_turn(s->regions, end[1], NULL, 0xff, &other);
+        vgi_limbs_turn(s->limbs, end[0], NULL, 0xff, &map);
+        vgi_limbs_turn(s->limbs, end[1], NULL, 0xff, &other);
         for (int i = 0; i < 9; i++)
             for (int lane = 0; lane < VGI_LANES; lane++) map.m[i][lane] += other.m[i][lane];
         vgi_transfer_kernel_now()->polar(&map, turn);
         return;
     }
-    vgi_regions_turn(s->regions, f, &s->maps[f], s->bad[f], turn);
+    vgi_limbs_turn(s->limbs, f, &s->maps[f], s->bad[f], turn);
 }
 
 /* Corner i of face f: the source's vector now, and the offset, turned, mixed with what is there. */
@@ -167,7 +167,7 @@ static void mix_face(const sums_job *j, size_t f)
 {
     const vg_sums *s = j->s;
     const vg_mesh *m = &s->g->faces;
-    const double *limbs = vgi_regions_limbs(s->regions);
+    const double *limbs = vgi_limbs_share(s->limbs);
     size_t begin = m->start[f], r = m->start[f + 1] - begin;
     vgi_map turn;
     if (r == 2 && f < s->faces) return; /* a bone */
@@ -198,8 +198,8 @@ void vg_sums_mix(vg_sums *s, size_t n, vg_kind kind, const double *const *poses,
         bool some = false;
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(s->threads, (s->faces + CHUNK - 1) / CHUNK, measure_chunk, &j);
-        vgi_regions_measure(s->regions, s->maps, s->bad, s->threads);
-        for (size_t k = 0; k < j.lanes; k++) some |= vgi_regions_limbs(s->regions)[k] < 1;
+        vgi_limbs_measure(s->limbs, s->maps, s->bad, s->threads);
+        for (size_t k = 0; k < j.lanes; k++) some |= vgi_limbs_share(s->limbs)[k] < 1;
         if (some) vgi_parallel(s->threads, (s->g->faces.nf + CHUNK - 1) / CHUNK, mix_chunk, &j);
     }
 }

@@ -5,7 +5,7 @@
  * The correspondence comes from register.c; the loops over corners are in transfer_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/places.h"
-#include "method/pairs/regions.h"
+#include "method/pairs/limbs.h"
 #include "method/pairs/similarity.h"
 #include "method/pairs/transfer_kernel.h"
 #include "numeric/face.h"
@@ -30,7 +30,7 @@ struct vg_cross_transfer {
     const double *source_reference;
     double ratio;          /* size of the target relative to the source */
     double scale;          /* of motions, by offset */
-    vgi_regions *regions;  /* of the source, where the way depends on how far parts turn; else NULL */
+    vgi_limbs *limbs;  /* of the source, where the way depends on how far parts turn; else NULL */
     double gradient[VGI_LANES]; /* by offset: the share of the gradients in the results, of eight poses */
     double *share;         /* per source vertex: of the part that drives the target, see vg_cross_transfer_root */
     double *p, *q;         /* see vgi_source */
@@ -285,7 +285,7 @@ void vg_cross_transfer_root(const vg_cross_transfer *c, const double *pose, doub
 
 double vg_cross_transfer_size(const vg_cross_transfer *c, bool small_motions)
 {
-    return small_motions && c->regions ? c->scale : c->ratio;
+    return small_motions && c->limbs ? c->scale : c->ratio;
 }
 
 void vg_cross_transfer_free(vg_cross_transfer **out)
@@ -305,7 +305,7 @@ void vg_cross_transfer_free(vg_cross_transfer **out)
     for (int i = 0; i < VGI_LANES; i++) free(c->points[i]);
     free(c->maps);
     vgi_incidence_clear(&c->around);
-    vgi_regions_free(&c->regions);
+    vgi_limbs_free(&c->limbs);
     free(c->twin);
     free(c->is_twin);
     vg_deformer_free(&c->deformer);
@@ -451,7 +451,7 @@ static void follow_places(const transfer_job *j, size_t f, vgi_map *map)
     if (some)
         vgi_transfer_kernel_now()->follow(map, VGI_FOLLOW_GRADIENT, c->vectors + 3 * begin, r, j->out, 3 * begin,
                                           j->lanes);
-    if (c->regions) vgi_regions_turn(c->regions, c->pairs->source[c->pairs->first[f]], map, 0, map);
+    if (c->limbs) vgi_limbs_turn(c->limbs, c->pairs->source[c->pairs->first[f]], map, 0, map);
     else vgi_transfer_kernel_now()->polar(map, map);
     mix_places(j, f, map);
 }
@@ -571,7 +571,7 @@ int vg_cross_transfer_fitted(vg_cross_transfer *c, const double *target_referenc
     for (size_t f = 0; f < g->faces.nf - g->nlinks; f++) c->placed[f] = place_face(c, f);
     if (r == VG_OK) r = measure_share(c, e);
     if (r < 0) return r;
-    return mixed ? vgi_regions_new(&c->regions, c->source, c->source_reference, e) : VG_OK;
+    return mixed ? vgi_limbs_new(&c->limbs, c->source, c->source_reference, e) : VG_OK;
 }
 
 void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors)
@@ -581,9 +581,9 @@ void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(c->threads, (c->source->nf + CHUNK - 1) / CHUNK, measure_chunk, &j);
         transfer_twins(&j);
-        if (c->regions) {
-            vgi_regions_measure(c->regions, c->maps, c->bad, c->threads);
-            memcpy(c->gradient, vgi_regions_limbs(c->regions), sizeof c->gradient);
+        if (c->limbs) {
+            vgi_limbs_measure(c->limbs, c->maps, c->bad, c->threads);
+            memcpy(c->gradient, vgi_limbs_share(c->limbs), sizeof c->gradient);
         }
         for (size_t k = 0; k < j.lanes && c->place; k++) place_points(c, j.poses[k], c->points[k]);
         vgi_parallel(c->threads, (c->target->faces.nf + CHUNK - 1) / CHUNK, follow_chunk, &j);

@@ -1,8 +1,8 @@
-/* test_regions.c: how the whole of a mesh and the neighbourhoods of its faces turn, against the rotations that made the
+/* test_limbs.c: how the whole of a mesh and the neighbourhoods of its faces turn, against the rotations that made the
  * pose.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
-#include "method/pairs/regions.h"
+#include "method/pairs/limbs.h"
 
 enum { LONG = 100, WIDE = 10, FACES = LONG * WIDE }; /* a strip of unit squares; face i WIDE + k is at x = i, y = k */
 
@@ -34,7 +34,7 @@ static double between(const vgi_map *a, const motion *b, int lane)
 
 typedef struct trial {
     vg_head h;
-    vgi_regions *r;
+    vgi_limbs *r;
     vgi_map *maps;
     unsigned char *bad;
 } trial;
@@ -44,7 +44,7 @@ static trial make_trial(size_t strips)
     trial t = {.h = new_shape()};
     vg_err e;
     for (size_t i = 0; i < strips; i++) add_strip(&t.h, 0.5 * (double)i);
-    CHECK(vgi_regions_new(&t.r, &t.h.body.mesh, t.h.body.reference, &e) == VG_OK);
+    CHECK(vgi_limbs_new(&t.r, &t.h.body.mesh, t.h.body.reference, &e) == VG_OK);
     t.maps = aligned_alloc(64, t.h.body.mesh.nf * sizeof *t.maps);
     t.bad = room(t.h.body.mesh.nf, 1);
     return t;
@@ -52,7 +52,7 @@ static trial make_trial(size_t strips)
 
 static void clear_trial(trial *t)
 {
-    vgi_regions_free(&t->r);
+    vgi_limbs_free(&t->r);
     vg_head_clear(&t->h);
     free(t->maps);
     free(t->bad);
@@ -61,7 +61,7 @@ static void clear_trial(trial *t)
 static double turned_around(const trial *t, size_t f, const motion *m)
 {
     vgi_map mean, turned;
-    vgi_regions_around(t->r, f, &mean);
+    vgi_limbs_around(t->r, f, &mean);
     vgi_transfer_kernel_now()->polar(&mean, &turned);
     return between(&turned, m, 3);
 }
@@ -73,9 +73,9 @@ static void test_limb(void)
         motion a = turn(n ? 1.1 : 0, 1, 0), b = turn((n ? 1.1 : 0) + M_PI / 6, 1, 0);
         trial t = make_trial(1);
         for (size_t f = 0; f < FACES; f++) set_map(&t.maps[f], f < 7 * FACES / 10 ? &a : &b);
-        vgi_regions_measure(t.r, t.maps, t.bad, 2);
-        CHECK(between(vgi_regions_whole(t.r), &a, 0) < 0.5);
-        CHECK_NEAR(vgi_regions_spread(t.r)[5], 0.3, 0.03);
+        vgi_limbs_measure(t.r, t.maps, t.bad, 2);
+        CHECK(between(vgi_limbs_whole(t.r), &a, 0) < 0.5);
+        CHECK_NEAR(vgi_limbs_spread(t.r)[5], 0.3, 0.03);
         CHECK(turned_around(&t, 5, &a) < 1e-6);
         CHECK(turned_around(&t, 95 * WIDE + 5, &b) < 1e-6);
         double last = 30; /* the way from one to the other is smooth */
@@ -94,8 +94,8 @@ static void test_fold(void)
     motion flat = turn(0, 1, 0), folded = turn(1.4, 1, 0);
     trial t = make_trial(1);
     for (size_t f = 0; f < FACES; f++) set_map(&t.maps[f], f / WIDE == 50 ? &folded : &flat);
-    vgi_regions_measure(t.r, t.maps, t.bad, 1);
-    CHECK(between(vgi_regions_whole(t.r), &flat, 7) < 0.01);
+    vgi_limbs_measure(t.r, t.maps, t.bad, 1);
+    CHECK(between(vgi_limbs_whole(t.r), &flat, 7) < 0.01);
     CHECK(turned_around(&t, 50 * WIDE + 5, &flat) < 10);
     clear_trial(&t);
 }
@@ -109,7 +109,7 @@ static void test_components(void)
         set_map(&t.maps[f], f % 3 == 0 ? &wrong : f < FACES ? &a : &b);
         if (f % 3 == 0) t.bad[f] = 0xff;
     }
-    vgi_regions_measure(t.r, t.maps, t.bad, 1);
+    vgi_limbs_measure(t.r, t.maps, t.bad, 1);
     for (size_t f = 0; f < 2 * FACES; f += 37) CHECK(turned_around(&t, f, f < FACES ? &a : &b) < 1e-6);
     clear_trial(&t);
 }

@@ -1,9 +1,9 @@
-/* regions.c: how the neighbourhoods of a mesh turn in a pose. The surface is divided into cells about 0.04 D wide. The
+/* limbs.c: how the neighbourhoods of a mesh turn in a pose. The surface is divided into cells about 0.04 D wide. The
  * map of a neighbourhood is the mean over the cells within 0.1 D that are connected to the face inside of this ball,
  * weighted by area and distance, so that it changes smoothly over the surface. Folds as small as lips and lids hardly
  * turn it; limbs do.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/pairs/regions.h"
+#include "method/pairs/limbs.h"
 #include "model/incidence.h"
 #include "numeric/face.h"
 
@@ -39,7 +39,7 @@ typedef struct part {
     double weight;
 } part;
 
-struct vgi_regions {
+struct vgi_limbs {
     size_t n, nf;         /* cells, faces */
     uint32_t *first_face; /* n + 1: of each cell in `face` */
     uint32_t *face;       /* nf: by cell */
@@ -68,7 +68,7 @@ typedef struct builder {
     double D;
 } builder;
 
-static int make_builder(builder *b, vgi_regions *r, const vg_mesh *m, const double *reference, vg_err *e)
+static int make_builder(builder *b, vgi_limbs *r, const vg_mesh *m, const double *reference, vg_err *e)
 {
     b->mesh = m;
     b->D = vg_diagonal(reference, m->nv);
@@ -155,7 +155,7 @@ static int flood(builder *b, uint32_t cell, uint32_t centre, vg_err *e)
 }
 
 /* Sort the faces by cell, and the parts by face. */
-static int sort_all(vgi_regions *r, const builder *b, vg_err *e)
+static int sort_all(vgi_limbs *r, const builder *b, vg_err *e)
 {
     r->first_face = vgi_array(r->n + 1, sizeof *r->first_face, e);
     r->face = vgi_array(r->nf, sizeof *r->face, e);
@@ -175,7 +175,7 @@ static int sort_all(vgi_regions *r, const builder *b, vg_err *e)
 }
 
 /* The area of the neighbourhood of each face says whether it can be a limb: an eyelash is none. */
-static int measure_size(vgi_regions *r, double D, vg_err *e)
+static int measure_size(vgi_limbs *r, double D, vg_err *e)
 {
     double *area = vgi_array(r->n, sizeof *area, e);
     r->large = vgi_array(r->nf, sizeof *r->large, e);
@@ -193,7 +193,7 @@ static int measure_size(vgi_regions *r, double D, vg_err *e)
     return r->large ? VG_OK : VG_ENOMEM;
 }
 
-static int make_lanes(vgi_regions *r, vg_err *e)
+static int make_lanes(vgi_limbs *r, vg_err *e)
 {
     r->sum = aligned_alloc(sizeof(vgi_lanes), (r->n + 1) * sizeof *r->sum);
     r->turn = aligned_alloc(sizeof(vgi_lanes), (r->n + 1) * sizeof *r->turn);
@@ -205,9 +205,9 @@ static int make_lanes(vgi_regions *r, vg_err *e)
     return vg_fail(e, VG_ENOMEM, "not enough memory for the neighbourhoods of %zu faces", r->nf);
 }
 
-int vgi_regions_new(vgi_regions **out, const vg_mesh *m, const double *reference, vg_err *e)
+int vgi_limbs_new(vgi_limbs **out, const vg_mesh *m, const double *reference, vg_err *e)
 {
-    vgi_regions *r = *out = vgi_array(1, sizeof *r, e);
+    vgi_limbs *r = *out = vgi_array(1, sizeof *r, e);
     builder b = {0};
     if (!r) return VG_ENOMEM;
     r->nf = m->nf;
@@ -218,11 +218,11 @@ int vgi_regions_new(vgi_regions **out, const vg_mesh *m, const double *reference
     if (done == VG_OK) done = measure_size(r, b.D > 0 ? b.D : 1, e);
     if (done == VG_OK) done = make_lanes(r, e);
     clear_builder(&b);
-    if (done < 0) vgi_regions_free(out);
+    if (done < 0) vgi_limbs_free(out);
     return done;
 }
 
-void vgi_regions_free(vgi_regions **r)
+void vgi_limbs_free(vgi_limbs **r)
 {
     if (!*r) return;
     free((*r)->first_face);
@@ -241,7 +241,7 @@ void vgi_regions_free(vgi_regions **r)
 /* ---- eight poses ---- */
 
 typedef struct measure_job {
-    vgi_regions *r;
+    vgi_limbs *r;
     const vgi_map *maps;
     const unsigned char *bad;
 } measure_job;
@@ -249,7 +249,7 @@ typedef struct measure_job {
 static void measure_cells(void *context, size_t chunk)
 {
     const measure_job *j = context;
-    vgi_regions *r = j->r;
+    vgi_limbs *r = j->r;
     size_t end = (chunk + 1) * CHUNK < r->n ? (chunk + 1) * CHUNK : r->n;
     for (size_t k = chunk * CHUNK; k < end; k++) {
         memset(&r->sum[k], 0, sizeof r->sum[k]);
@@ -270,7 +270,7 @@ static double weigh(double square, bool sharp)
 }
 
 /* One round: the mean of the cells' rotations, weighted by area and by how near they are to the last one. */
-static void improve_whole(vgi_regions *r, bool sharp)
+static void improve_whole(vgi_limbs *r, bool sharp)
 {
     vgi_map sum;
     memset(&sum, 0, sizeof sum);
@@ -289,7 +289,7 @@ static void improve_whole(vgi_regions *r, bool sharp)
 }
 
 /* The share of the surface that is turned against the whole; a part that is turned by 5 degrees counts half. */
-static void measure_spread(vgi_regions *r)
+static void measure_spread(vgi_limbs *r)
 {
     for (int lane = 0; lane < VGI_LANES; lane++) {
         double sum = 0, area = 0;
@@ -305,7 +305,7 @@ static void measure_spread(vgi_regions *r)
     }
 }
 
-void vgi_regions_measure(vgi_regions *r, const vgi_map *maps, const unsigned char *bad, int threads)
+void vgi_limbs_measure(vgi_limbs *r, const vgi_map *maps, const unsigned char *bad, int threads)
 {
     measure_job j = {r, maps, bad};
     vgi_parallel(threads, (r->n + CHUNK - 1) / CHUNK, measure_cells, &j);
@@ -319,22 +319,22 @@ void vgi_regions_measure(vgi_regions *r, const vgi_map *maps, const unsigned cha
     measure_spread(r);
 }
 
-const vgi_map *vgi_regions_whole(const vgi_regions *r)
+const vgi_map *vgi_limbs_whole(const vgi_limbs *r)
 {
     return r->whole;
 }
 
-const double *vgi_regions_spread(const vgi_regions *r)
+const double *vgi_limbs_spread(const vgi_limbs *r)
 {
     return r->spread;
 }
 
-const double *vgi_regions_limbs(const vgi_regions *r)
+const double *vgi_limbs_share(const vgi_limbs *r)
 {
     return r->limbs;
 }
 
-void vgi_regions_around(const vgi_regions *r, size_t f, vgi_map *mean)
+void vgi_limbs_around(const vgi_limbs *r, size_t f, vgi_map *mean)
 {
     memset(mean, 0, sizeof *mean);
     for (uint32_t p = r->first[f]; p < r->first[f + 1]; p++) {
@@ -374,10 +374,10 @@ static void turn_on(vgi_map *base, const vgi_map *map, double stays, double turn
     vgi_transfer_kernel_now()->polar(&much, base);
 }
 
-void vgi_regions_turn(const vgi_regions *r, size_t f, const vgi_map *map, unsigned bad, vgi_map *turn)
+void vgi_limbs_turn(const vgi_limbs *r, size_t f, const vgi_map *map, unsigned bad, vgi_map *turn)
 {
     vgi_map base = *r->whole, around, own;
-    vgi_regions_around(r, f, &around);
+    vgi_limbs_around(r, f, &around);
     turn_on(&base, &around, AROUND_STAYS, AROUND_TURNS, r->large[f]);
     own = map ? *map : base;
     for (int i = 0; i < 9; i++)
